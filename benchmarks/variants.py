@@ -24,12 +24,16 @@ from benchmarks.timing import Timing, printed_by_processes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from types import ModuleType
 
     Solve = Callable[[Vector, Vector], Motion]
 
 VARIANTS, TIMES, CHUNK = 100_000, 100, 2_000
 SPREAD = 0.02
 """Relative spread of the lengths: all variants can be assembled and turn."""
+
+STOPPED = 1000
+"""Sets of each kind that are compared with those that move."""
 
 PROCESSES = 3
 AGREEMENT = 1e-8
@@ -49,7 +53,7 @@ def main(variants: int) -> None:
     )
     points = f"{variants:,} variants x {TIMES} times"
     print_table(f"Four-bar, {points}", heads, rows(found, skipped))
-    print_targets("Variants: what was to be reached", reached(found))
+    print_targets("Variants: what was to be reached", [*reached(found), *stopped()])
     print(f"{machine.description()}. Load before {before}, after {machine.load()}.")
 
 
@@ -147,6 +151,26 @@ def reached(found: dict[str, tuple[Timing, ...]]) -> Iterator[Target]:
     for name, limit in ((NUMPY, 1.2), (C, 0.2)):
         if name in found:
             yield Target(f"{name}, us a point", found[name][0].median * 1e6, "at most", limit, "us")
+
+
+def stopped() -> Iterator[Target]:
+    """Compare sets that lock up, or cannot be assembled, with sets that move."""
+    t, moving = FOUR_BAR.times(50), next(chunks(STOPPED))
+    ends = {"locks up": (3, 2.5), "cannot be assembled": (0, 2.0)}  # longer by so much
+    for target in ("numpy", "c"):
+        module = kc.compile(FOUR_BAR.mechanism(), target)
+
+        def seconds(p: Vector, module: ModuleType = module) -> float:
+            start = process_time()
+            kc.solve(module, t, p[:, np.newaxis])
+            return process_time() - start
+
+        least = min(seconds(moving) for _ in range(PROCESSES))
+        for what, (place, factor) in ends.items():
+            p = moving.copy()
+            p[:, place] *= factor
+            ratio = min(seconds(p) for _ in range(PROCESSES)) / least
+            yield Target(f"{target}: a set that {what} / one that moves", ratio, "at most", 10, "x")
 
 
 def _peak() -> float:

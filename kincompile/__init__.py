@@ -12,7 +12,6 @@ import re
 import sys
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from kincompile.names import suggestion
@@ -58,18 +57,3 @@ def _constraint_types() -> tuple[str, ...]:
 
 def __dir__() -> list[str]:
     return [*__getattr__("__all__"), "__version__"]
-
-
-class _Package(ModuleType):
-    """The package: a folder does not hide the public function of the same name.
-
-    Importing `kincompile.compare`, `derivation` or `verify` would put the folder in the place of
-    `kc.compare`, `kc.derivation` or `kc.verify`.
-    """
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if not (name in _HOME and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package

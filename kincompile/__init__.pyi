@@ -4,12 +4,12 @@
 are those of the catalogue.
 """
 
-from kincompile.compare.compare import compare as compare
-from kincompile.compare.compare import compare_file as compare_file
+from kincompile.checker.compare import compare as compare
+from kincompile.checker.compare import compare_file as compare_file
 from kincompile.compiler import compile as compile  # noqa: A004
 from kincompile.compiler import emit as emit
 from kincompile.compiler import inspect as inspect
-from kincompile.derivation.derivation import derivation as derivation
+from kincompile.derivations.derivation import derivation as derivation
 from kincompile.design import targets as targets
 from kincompile.design.deviation import Deviation as Deviation
 from kincompile.design.fit import fit as fit
@@ -20,6 +20,7 @@ from kincompile.errors import AssemblyWarning as AssemblyWarning
 from kincompile.errors import BranchSwitchWarning as BranchSwitchWarning
 from kincompile.errors import ContractError as ContractError
 from kincompile.errors import CornerWarning as CornerWarning
+from kincompile.errors import DamagedStoreWarning as DamagedStoreWarning
 from kincompile.errors import InputError as InputError
 from kincompile.errors import InternalError as InternalError
 from kincompile.errors import KincompileError as KincompileError
@@ -74,9 +75,9 @@ from kincompile.runtime.statics.flywheel import Flywheel as Flywheel
 from kincompile.runtime.statics.flywheel import flywheel as flywheel
 from kincompile.runtime.status import Status as Status
 from kincompile.runtime.times import times_at as times_at
-from kincompile.sweep.result import Sweep as Sweep
-from kincompile.sweep.sweep import sweep as sweep
-from kincompile.verify.verify import verify as verify
+from kincompile.sweeps.result import Sweep as Sweep
+from kincompile.sweeps.sweep import sweep as sweep
+from kincompile.verification.verify import verify as verify
 from kincompile.view.animation import animate as animate
 from kincompile.view.draw import draw as draw
 from kincompile.view.gallery import assembly_gallery as assembly_gallery

@@ -47,6 +47,9 @@ MAX_ITERATIONS = 25
 MAX_CORRECTIONS = 6
 """Iterations from a prediction after which it is given up; a good one takes three."""
 
+MAX_SHORTEST = 60
+"""Shortest steps after which an attempt is given up: one moves nothing by more than a scale."""
+
 # Assembled
 
 NEAR_ANGLE, NEAR_PART = math.pi / 6, 0.1
@@ -59,6 +62,10 @@ SETTLED = 0.5
 ASTRAY = 5.0
 """Distance from a guess, in those up to which it is near, beyond which steps went astray: half the
 size of the mechanism."""
+
+THROWN = 10.0
+"""Distance from a guess, in those up to which it is near, beyond which an iterate is thrown so far
+that rounding errors decide where the next ones end."""
 
 AS_NEAR = 1.1
 """How much further from a guess an assembly may be, and still be named as one that is as near."""
@@ -85,11 +92,40 @@ RESIDUAL_FACTOR = 10.0
 ASSEMBLED = RESIDUAL_FACTOR * TOLERANCE
 """Residual, relative to its terms, of an assembled position."""
 
+SOLVED = 1e-10
+"""Part of its terms by which an equation of Phi_q x = b may miss its right side: what elimination
+leaves of it up to the sensitivity from which rates are uncertain. Terms are those of the
+equation's own coefficients and the largest component of x, in scales."""
+
 AGREEMENT = 1e-6
 """Part of the terms by which redundant equations may contradict each other in the rates."""
 
 RANK = 1e-9
 """Singular value of Phi_q in scales, relative to the largest, that is zero."""
+
+# Zero
+
+TINY = 1e-300
+"""In place of nothing, where it is divided by."""
+
+NOISE = 1e-12
+"""Part of the terms of a sum, or of the largest number of a kind, that is a rounding error."""
+
+STILL = 1e-11
+"""Movement, relative to the largest number of the same unit, that is a rounding error."""
+
+ZERO = 1e-9
+"""Part of a whole that is nothing: of the terms of a sum at a random state, of the forces that act,
+of the largest residual, of a movement."""
+
+HALF = 1e-8
+"""Part of a number that leaves half of its digits: up to it two that were solved for agree."""
+
+SLIGHT = 1e-6
+"""Part of a whole that is nothing where it was worked out by differences, roots or ranks."""
+
+NEAR_MISS = 1e-3
+"""What equations are missed by, relative to their terms, where they may hold after all."""
 
 # Near singular. Sensitivity: movement, in scales, for an error of one scale in the equations
 
@@ -130,6 +166,10 @@ number rounding errors decide."""
 KINK_UNSEEN, SMOOTH_UNSEEN = 16.0, 1e-6
 """The same where the sensitivity is not known: looser, as the step is divided by those who know."""
 
+BEYOND = 1e-3
+"""Part of a line of parameters beyond its end at which a bifurcation shows, and movement beyond the
+end of a motion: there the mechanism can be assembled near by, which beyond a lock-up it cannot."""
+
 # Corners of drivers
 
 CORNER = 1e-9
@@ -142,6 +182,12 @@ SAME_TIME = 4 * float(np.finfo(np.float64).eps)
 
 SMALLEST_PART = 2.0**-20
 """A step of this part of the distance between two times is not halved again."""
+
+LEFT, GROWN, BEFORE_LOCK_UP = 64.0, 8.0, 1e-4
+"""How a march that cannot take its smallest step any more is known to be at a lock-up. Velocities
+grow there as one over the root of the time that is left, so that this is q_dot / (2 q_ddot): at
+most so many smallest steps. They have grown by so much since the time before, and the time that was
+to be reached lies beyond the lock-up by more than this part of the way to it."""
 
 MAX_SUBSTEPS = 10_000
 """Sub-steps between two times after which the march is given up, about a second."""
@@ -168,6 +214,9 @@ there are, each as much further away."""
 
 SAME_POSITION = 1e-6
 """Distance, in radians and sizes of the mechanism, up to which two positions are the same."""
+
+LONGEST_P = 2.0
+"""Length above which, as below its inverse, Euler parameters of a guess are divided by it."""
 
 MOST_TURNED = 300
 """Angles up to which each is turned back alone where they do not turn back together."""

@@ -79,6 +79,21 @@ def package_of_extra(package: str, extra: str) -> Iterator[None]:
         ) from None
 
 
+@contextmanager
+def memory_for(what: str, remedy: str) -> Iterator[None]:
+    """Say what takes too much memory, inside the `with` statement, and what to do.
+
+    Raises
+    ------
+    InputError
+        If there is not as much memory as is asked for.
+    """
+    try:
+        yield
+    except MemoryError:
+        raise InputError(f"{what}, more than this machine has memory: {remedy}.") from None
+
+
 class TemplateError(KincompileError):
     """A template and the data for it do not fit together."""
 
@@ -124,12 +139,12 @@ class SweepError(KincompileError, RuntimeError):
     ----------
     message : str
         What the executor says, what is kept, and what to do.
-    sweep : kincompile.sweep.result.Sweep
+    sweep : kincompile.sweeps.result.Sweep
         What was solved before.
 
     Attributes
     ----------
-    sweep : kincompile.sweep.result.Sweep
+    sweep : kincompile.sweeps.result.Sweep
         What was solved before; the status of the rest is -1.
     """
 
@@ -173,6 +188,10 @@ class AssemblyWarning(KincompileWarning):
 
 class BranchSwitchWarning(KincompileWarning):
     """The solution may have changed from one assembly branch to another."""
+
+
+class DamagedStoreWarning(KincompileWarning):
+    """Files of a sweep's folder are damaged or missing, and are written again."""
 
 
 class CornerWarning(KincompileWarning):

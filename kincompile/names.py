@@ -23,6 +23,9 @@ LONGEST = 60
 """Characters of a value that a message shows."""
 
 _KINDS: dict[type, str] = {dict: "a table", bool: "a truth value", type(None): "null"}
+LARGEST_SEED = 2**32 - 1
+"""Largest seed of random numbers that every generator takes."""
+
 MOST_CHARACTERS = 100
 """Length of a name: files are called by it, and an operating system has a limit."""
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import kincompile as kc
 from tests.pendulum import pendulum
 
-folder, seconds = sys.argv[1], int(sys.argv[2])
+folder, seconds, most = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
 model = pendulum()
 model.system()
 
@@ -33,7 +33,7 @@ for path in sorted(Path(folder).iterdir()):
     child = os.fork()
     if not child:
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-        resource.setrlimit(resource.RLIMIT_AS, ({BYTES}, {BYTES}))
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
         started, verdict, text = time.process_time(), "read", "it was read"
         try:
             read(path)
@@ -54,12 +54,14 @@ for path in sorted(Path(folder).iterdir()):
 """
 
 
-def read_bounded(folder: Path, seconds: int) -> dict[str, tuple[str, str, float]]:
+def read_bounded(
+    folder: Path, seconds: int, most: int = BYTES
+) -> dict[str, tuple[str, str, float]]:
     """Return of each file in a folder, by name: the verdict, the message and the seconds."""
     root = str(Path(__file__).parents[1])
     path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
     done = subprocess.run(
-        [sys.executable, "-c", READ, str(folder), str(seconds)],
+        [sys.executable, "-c", READ, str(folder), str(seconds), str(most)],
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": path},
         capture_output=True, text=True, check=True, timeout=570,
     )  # fmt: skip

@@ -1,5 +1,6 @@
 """What every test shares: fixed seeds, the option that rewrites the goldens, and the examples."""
 
+import gc
 import os
 import runpy
 import shutil
@@ -33,6 +34,35 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="rewrite generated/ from the examples, remove strays, list both and fail the run",
     )
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Return what gives tests to processes with `--dist=loadfile`, as the Makefile asks."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadScopeScheduling  # several processes are optional
+
+    class Together(LoadScopeScheduling):  # type: ignore[misc]
+        """One process has the tests of a file, which share what is made once; long ones go alone.
+
+        The tests of the targets share what each target says of all mechanisms.
+        """
+
+        def _split_scope(self, nodeid: str) -> str:
+            path, _, _ = nodeid.partition("::")
+            if path.startswith("tests/targets/"):
+                return "tests/targets"
+            return nodeid if config.option.markexpr == "slow" else path
+
+    return Together(config, log)
+
+
+def pytest_collection_finish() -> None:
+    """Let the collector of garbage look less often, and not through what is there to stay."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 50)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -100,16 +130,17 @@ def load_example(path: Path) -> Example:
     return Example(path, names["mechanism"] if "mechanism" in names else names["system"])
 
 
-@pytest.fixture(scope="session")
-def quick_compiler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Let the C target build in a cache of this session, with little optimization.
+@pytest.fixture(scope="session", autouse=True)
+def compiler_of_session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str | None]:
+    """Let the C target build in a cache of this session, without optimization.
 
     What the optimization does is left to the tests that ask for the machine's own compiler, whose
-    path is the fixture's value.
+    path is the fixture's value; None where there is none.
     """
     compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
     if compiler is None:
-        pytest.skip("there is no C compiler")
+        yield None
+        return
     folder = tmp_path_factory.mktemp("native")
     quick = folder / "quick-cc"
     quick.write_text(
@@ -124,6 +155,14 @@ def quick_compiler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         os.environ.pop(name)
         if value is not None:
             os.environ[name] = value
+
+
+@pytest.fixture(scope="session")
+def quick_compiler(compiler_of_session: str | None) -> str:
+    """Return the machine's own compiler; a test that needs one asks for it."""
+    if compiler_of_session is None:
+        pytest.skip("there is no C compiler")
+    return compiler_of_session
 
 
 MORE = {"double_wishbone", "jansen", "klann", "shaper", "swing_and_dwell"}

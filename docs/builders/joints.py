@@ -12,9 +12,9 @@ import sympy
 import kincompile as kc
 from docs.builders.places import DOCS
 from docs.builders.space import alone
-from kincompile.derivation.document import Figure
-from kincompile.derivation.slides import ATTRIBUTES
-from kincompile.derivation.svg import standalone_svg
+from kincompile.derivations.document import Figure
+from kincompile.derivations.slides import ATTRIBUTES
+from kincompile.derivations.svg import standalone_svg
 from kincompile.model.catalogue import CONSTRAINTS
 from kincompile.space.catalogue import CONSTRAINTS as IN_SPACE
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from kincompile import spatial
-    from kincompile.derivation.derivation import Derivation
+    from kincompile.derivations.derivation import Derivation
     from kincompile.model.constraint import Constraint
 
 BEGIN, END = "<!-- catalogue -->\n", "<!-- end of catalogue -->\n"

@@ -28,7 +28,7 @@ JOINTS: Mapping[str, Callable[[Any, Any, Any], tuple[Any, ...]]] = {
     "Cylindrical": lambda g, a, b: (g, a - SHORT * X, X, b, ORIGIN, X),
     "Translational": lambda g, a, b: (g, a - SHORT * X, X, Y, b, ORIGIN, X, Z),
     "Universal": lambda g, a, b: (g, a, X, b, ORIGIN, Y),
-    "ConstantVelocity": lambda g, a, b: (g, a, X, Y, b, ORIGIN, Z, X),
+    "ConstantVelocity": lambda g, a, b: (g, a, X, Y, b, ORIGIN, Z, Y),
     "Screw": lambda g, a, b: (g, a - SHORT * X, X, Y, b, ORIGIN, X, Y, 0.01),
     "Planar": lambda g, a, b: (g, a, Z, b, ORIGIN, Z),
     "Fixed": lambda g, a, b: (g, a, Z, X, b, ORIGIN, Z, X),

@@ -25,7 +25,8 @@ for k, (angle, (a, s, c)) in enumerate(zip(angles, links, strict=False)):
     u, v = np.cos(angle), np.sin(angle)
     place = place + turn @ (a * u, a * v, 0)
     turn = turn @ np.array([[u, -v * c, v * s], [v, u * c, -u * s], [0, s, c]])
-    bodies.append(m.body(f"link_{k + 1}", place, turn))
+    # A guess; rounded, it has the same digits on every processor.
+    bodies.append(m.body(f"link_{k + 1}", place.round(9), turn.round(9)))
 bodies.append(m.ground)
 for k, (a, s, c) in enumerate(links):
     near = (bodies[k + 1], (-a, 0, 0), (0, s, c))
@@ -36,7 +37,7 @@ m.add(
     )
 )
 second = (bodies[2], (0, 0.96, 0.28), X)
-m.add(spatial.JointAngle("second", bodies[1], Z, X, *second, guess=angles[1]))
+m.add(spatial.JointAngle("second", bodies[1], Z, X, *second, guess=round(angles[1], 9)))
 
 if __name__ == "__main__":
     solution = kc.solve(kc.compile(m), np.linspace(0, m.end, m.points))

@@ -79,10 +79,13 @@ void cam_by_table_solve(const cam_by_table_system *system);
 // What became of a point in time.
 enum {
     CAM_BY_TABLE_CONVERGED = 0,      // position, velocity and acceleration were found
-    CAM_BY_TABLE_NOT_CONVERGED = 1,  // no position was found that continues the motion
-    CAM_BY_TABLE_SINGULAR = 2,       // Phi_q is singular: lock-up, bifurcation or dependent constraints
+    CAM_BY_TABLE_NOT_CONVERGED = 1,  // no position was found, or none that continues the motion
+    CAM_BY_TABLE_SINGULAR = 2,       // Phi_q is singular (lock-up, bifurcation, dependent constraints), or
+                                   // so nearly that the rates found do not meet their equations
     CAM_BY_TABLE_NOT_FINITE = 3,     // an equation or a derivative is not a finite number
     CAM_BY_TABLE_NOT_REACHED = 4,    // not tried, because an earlier point failed
+    CAM_BY_TABLE_LOCK_UP = 7,        // the drivers demand what the joints cannot give: velocities grow
+                                   // beyond all bounds before this time
 };
 
 // A motion over the times t, rising or falling, with one set of parameters. Newton starts from the

@@ -86,14 +86,14 @@ typedef struct {
 } strip;
 
 #ifdef __GNUC__
-#define INLINE static inline __attribute__((always_inline, unused))
+#define _always_inline static inline __attribute__((always_inline, unused))
 #else
-#define INLINE static inline
+#define _always_inline static inline
 #endif
 
-#define PI 3.141592653589793
+#define _pi 3.141592653589793
 
-INLINE double square(double x)
+_always_inline double square(double x)
 {
     return x * x;
 }
@@ -101,7 +101,7 @@ INLINE double square(double x)
 // Cosine and sine without a branch, so that several points can be taken at once; in error by less
 // than one unit in the last place. Returns not 0 where the angle is too large for that: then the
 // caller evaluates again, `exact`, by the library's functions.
-INLINE int64_t cos_sin(double angle, int exact, double *cosine, double *sine)
+_always_inline int64_t cos_sin(double angle, int exact, double *cosine, double *sine)
 {
     if (exact) {
         *cosine = cos(angle);
@@ -138,7 +138,7 @@ INLINE int64_t cos_sin(double angle, int exact, double *cosine, double *sine)
 }
 
 // Phi and Phi_q in one go: a step of Newton's method.
-INLINE int64_t position_at(strip *at, size_t lane, int exact)
+_always_inline int64_t position_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double x_crank = at->q[0][lane];
@@ -218,7 +218,7 @@ static void position_of_strip(strip *at, size_t count)
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
-INLINE void nu_at(strip *at, size_t lane)
+_always_inline void nu_at(strip *at, size_t lane)
 {
     const double omega = at->p[4][lane];
     // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
@@ -244,7 +244,7 @@ static void nu_of_strip(strip *at, size_t count)
 }
 
 // Right side of the acceleration equation Phi_q q_ddot = gamma.
-INLINE int64_t gamma_at(strip *at, size_t lane, int exact)
+_always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double phi_crank = at->q[2][lane];
@@ -305,7 +305,7 @@ static void gamma_of_strip(strip *at, size_t count)
 }
 
 // Phi, Phi_q, nu and gamma in one go.
-INLINE int64_t kinematics_at(strip *at, size_t lane, int exact)
+_always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double x_crank = at->q[0][lane];
@@ -428,7 +428,7 @@ static void kinematics_of_strip(strip *at, size_t count)
 // eliminated: phi_crank by motor, x_crank by A.x, y_crank by A.y, x_coupler by B.x
 // y_coupler by B.y, x_rocker by D.x, y_rocker by D.y
 // block: phi_coupler, phi_rocker by C.x, C.y
-INLINE void factor_at(strip *at, size_t lane)
+_always_inline void factor_at(strip *at, size_t lane)
 {
     const double A_x_phi_crank = at->Phi_q[1][lane];
     const double A_y_phi_crank = at->Phi_q[3][lane];
@@ -471,8 +471,8 @@ static void factor_of_strip(strip *at, size_t count)
 }
 
 // x of Phi_q x = right.
-INLINE void solve_at(const double (*restrict F)[LANES],
-    const double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)
+_always_inline void solve_at(double (*restrict F)[LANES],
+    double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)
 {
     const double A_x_phi_crank = F[0][lane];
     const double A_y_phi_crank = F[1][lane];
@@ -519,14 +519,70 @@ INLINE void solve_at(const double (*restrict F)[LANES],
     to[8][lane] = phi_rocker;
 }
 
-static void solve_of_strip(const strip *at, double (*right)[LANES], double (*to)[LANES],
-    size_t count)
+// What rates miss of Phi_q q_dot = nu and Phi_q q_ddot = gamma: sums of squares.
+_always_inline void missed_at(const strip *at, const double (*weight)[LANES],
+    double *by_velocity, double *by_acceleration, size_t lane)
 {
-    double b[M][LANES], x[N][LANES];  // no other pointer leads there: the loop takes several lanes
-    memcpy(b, right, sizeof b);
+    double velocity = 0, acceleration = 0, rest;
+    // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
+    rest = -(at->q_dot[0][lane] + at->Phi_q[1][lane] * at->q_dot[2][lane]);
+    velocity += weight[0][lane] * rest * rest;
+    rest = -(at->q_dot[1][lane] + at->Phi_q[3][lane] * at->q_dot[2][lane]);
+    velocity += weight[1][lane] * rest * rest;
+    rest = at->gamma[0][lane] - at->q_ddot[0][lane] - at->Phi_q[1][lane] * at->q_ddot[2][lane];
+    acceleration += weight[0][lane] * rest * rest;
+    rest = at->gamma[1][lane] - at->q_ddot[1][lane] - at->Phi_q[3][lane] * at->q_ddot[2][lane];
+    acceleration += weight[1][lane] * rest * rest;
+    // 2-3  Revolute "B": crank (a/2, 0) - coupler (-b/2, 0)
+    rest = at->q_dot[3][lane] - (at->q_dot[0][lane] + at->Phi_q[5][lane] * at->q_dot[2][lane])
+        - at->Phi_q[7][lane] * at->q_dot[5][lane];
+    velocity += weight[2][lane] * rest * rest;
+    rest = at->q_dot[4][lane] - (at->q_dot[1][lane] + at->Phi_q[9][lane] * at->q_dot[2][lane])
+        - at->Phi_q[11][lane] * at->q_dot[5][lane];
+    velocity += weight[3][lane] * rest * rest;
+    rest = at->gamma[2][lane] - at->q_ddot[0][lane] - at->Phi_q[5][lane] * at->q_ddot[2][lane]
+        + at->q_ddot[3][lane] - at->Phi_q[7][lane] * at->q_ddot[5][lane];
+    acceleration += weight[2][lane] * rest * rest;
+    rest = at->gamma[3][lane] - at->q_ddot[1][lane] - at->Phi_q[9][lane] * at->q_ddot[2][lane]
+        + at->q_ddot[4][lane] - at->Phi_q[11][lane] * at->q_ddot[5][lane];
+    acceleration += weight[3][lane] * rest * rest;
+    // 4-5  Revolute "C": coupler (b/2, 0) - rocker (-c/2, 0)
+    rest = at->q_dot[6][lane] - (at->q_dot[3][lane] + at->Phi_q[13][lane] * at->q_dot[5][lane])
+        - at->Phi_q[15][lane] * at->q_dot[8][lane];
+    velocity += weight[4][lane] * rest * rest;
+    rest = at->q_dot[7][lane] - (at->q_dot[4][lane] + at->Phi_q[17][lane] * at->q_dot[5][lane])
+        - at->Phi_q[19][lane] * at->q_dot[8][lane];
+    velocity += weight[5][lane] * rest * rest;
+    rest = at->gamma[4][lane] - at->q_ddot[3][lane] - at->Phi_q[13][lane] * at->q_ddot[5][lane]
+        + at->q_ddot[6][lane] - at->Phi_q[15][lane] * at->q_ddot[8][lane];
+    acceleration += weight[4][lane] * rest * rest;
+    rest = at->gamma[5][lane] - at->q_ddot[4][lane] - at->Phi_q[17][lane] * at->q_ddot[5][lane]
+        + at->q_ddot[7][lane] - at->Phi_q[19][lane] * at->q_ddot[8][lane];
+    acceleration += weight[5][lane] * rest * rest;
+    // 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
+    rest = -(at->q_dot[6][lane] + at->Phi_q[21][lane] * at->q_dot[8][lane]);
+    velocity += weight[6][lane] * rest * rest;
+    rest = -(at->q_dot[7][lane] + at->Phi_q[23][lane] * at->q_dot[8][lane]);
+    velocity += weight[7][lane] * rest * rest;
+    rest = at->gamma[6][lane] - at->q_ddot[6][lane] - at->Phi_q[21][lane] * at->q_ddot[8][lane];
+    acceleration += weight[6][lane] * rest * rest;
+    rest = at->gamma[7][lane] - at->q_ddot[7][lane] - at->Phi_q[23][lane] * at->q_ddot[8][lane];
+    acceleration += weight[7][lane] * rest * rest;
+    // 8  AbsoluteAngle "motor": crank angle omega*t
+    rest = at->nu[8][lane] - at->q_dot[2][lane];
+    velocity += weight[8][lane] * rest * rest;
+    rest = -at->q_ddot[2][lane];
+    acceleration += weight[8][lane] * rest * rest;
+    *by_velocity = velocity;
+    *by_acceleration = acceleration;
+}
+
+// No two of these overlap: the loop takes several lanes.
+static void solve_of_strip(double (*restrict F)[LANES], double (*restrict right)[LANES],
+    double (*restrict to)[LANES], size_t count)
+{
     for (size_t lane = 0; lane < count; lane++)
-        solve_at((const double (*)[LANES])at->F, (const double (*)[LANES])b, x, lane);
-    memcpy(to, x, sizeof x);
+        solve_at(F, right, to, lane);
 }
 
 // Copy numbers of `count` points, from point `start` on, into rows; what is not finite shows in
@@ -548,7 +604,7 @@ static void read_rows(double (*rows)[LANES], size_t size, four_bar_input from, s
 
 #ifdef __x86_64__
 // Write a number past the caches.
-INLINE void stream(double *to, double number)
+_always_inline void stream(double *to, double number)
 {
     long long bits;
     memcpy(&bits, &number, sizeof bits);
@@ -558,7 +614,7 @@ INLINE void stream(double *to, double number)
 
 // Copy numbers; past the caches if so many are being written that those could not hold them: a batch
 // of 100,000 points of a four-bar takes 33 ns a point so, and 58 without.
-INLINE void copy(double *to, const double *from, size_t size, int is_far)
+_always_inline void copy(double *to, const double *from, size_t size, int is_far)
 {
 #ifdef __x86_64__
     const size_t first = is_far && (uintptr_t)to % 16 != 0, pairs = is_far ? (size - first) / 2 : 0;
@@ -655,7 +711,7 @@ static void run_kernels(unsigned wanted, strip *b, size_t count)
 
 // Write the nonzeros into whole matrices: all entries, or only those that are computed. `matrix`
 // holds the others.
-INLINE void write_matrices(four_bar_output to, const quantity *q, double (*rows)[LANES],
+_always_inline void write_matrices(four_bar_output to, const quantity *q, double (*rows)[LANES],
     double *matrix, int varying_only, size_t start, size_t count, int is_far)
 {
     const int is_copied = to.entry == 1 && !varying_only, size = q->height * q->width;
@@ -673,12 +729,12 @@ INLINE void write_matrices(four_bar_output to, const quantity *q, double (*rows)
 }
 
 // The entries of a quantity in a strip, and the outputs of a batch.
-INLINE double (*rows_of(strip *b, const quantity *q))[LANES]
+_always_inline double (*rows_of(strip *b, const quantity *q))[LANES]
 {
     return (double (*)[LANES])((char *)b + q->rows);
 }
 
-INLINE four_bar_output output_of(const four_bar_batch *batch, size_t offset)
+_always_inline four_bar_output output_of(const four_bar_batch *batch, size_t offset)
 {
     return *(const four_bar_output *)((const char *)batch + offset);
 }
@@ -699,7 +755,7 @@ static void place_constants(strip *b, double *matrices, size_t count)
 
 // Write a quantity of a strip of points: as vectors or nonzeros, and as whole matrices. It is called
 // once a quantity, so that a compiler knows the sizes.
-INLINE void write_quantity(const four_bar_batch *batch, const quantity *q, strip *b,
+_always_inline void write_quantity(const four_bar_batch *batch, const quantity *q, strip *b,
     double *matrices, size_t start, size_t count, int is_far)
 {
     const four_bar_output whole = output_of(batch, q->result);
@@ -770,25 +826,10 @@ void four_bar_solve(const four_bar_system *system)
         read_rows(b.Phi_q, NONZEROS, system->nonzeros, start, count, check);
         read_rows(right, M, system->b, start, count, check);
         factor_of_strip(&b, count);
-        solve_of_strip(&b, right, x, count);
+        solve_of_strip(b.F, right, x, count);
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
-
-// By what the numbers of a motion are judged; each point of a strip has its own.
-typedef struct {
-    double reference[N][LANES];  // scale of each coordinate: 1 rad, or the size of the mechanism
-    double inverse[N][LANES];    // and its inverse: a division takes as long as five products
-    double magnitude[M][LANES];  // what the terms of each equation contribute at a generic position
-    double noise[M][LANES];      // what rounding errors of the coordinates leave of each equation
-    double tolerance;
-} scales;
-
-// What became of the points of a strip; those that are over are not looked at any more.
-typedef struct {
-    int status[LANES], iterations[LANES], is_over[LANES];
-    double residual[LANES], sensitivity[LANES];
-} outcome;
 
 // Which coordinates are angles; numbers of size 1/2 to 1 and either sign without a pattern.
 static const int ANGULAR[] = {
@@ -803,7 +844,7 @@ static const double PROBE[] = {
 // Error of a prediction, in radians or sizes of the mechanism, up to which it stays on its branch.
 // Sensitivity is the movement, in scales, for an error of one scale in the equations: beyond
 // TOO_NEAR rates are too uncertain to go on from.
-static const double LARGEST_ERROR = 0.05, TOO_NEAR = 100000.0;
+static const double SMALL_ERROR = 0.05, TOO_NEAR = 100000.0;
 // Sensitivity from which on Newton may confuse two branches. On one branch the error of the predicted
 // velocity, times the step, is a few times that of the position. Below SMOOTH rounding decides.
 static const double NEARLY_SINGULAR = 30.0, KINK = 8.0, SMOOTH = 1e-09;
@@ -811,112 +852,18 @@ static const double NEARLY_SINGULAR = 30.0, KINK = 8.0, SMOOTH = 1e-09;
 // rounding leaves; the part of the way between two times below which a step is not halved.
 static const double RESIDUAL_FACTOR = 10.0, ROUNDING = 3.552713678800501e-15;
 static const double SMALLEST_PART = 9.5367431640625e-07;
+// Part of its terms by which an equation of Phi_q x = b may miss its right side.
+static const double SOLVED = 1e-10;
+// The same of equations that repeat others, and which these are.
+static const double AGREEMENT = 1e-06;
+static const int IS_REDUNDANT[] = {
+    0, 0, 0, 0, 0, 0, 0, 0, 0,
+};
+// At a lock-up velocities grow as one over the root of the time that is left: it is at most LEFT
+// smallest steps, they have GROWN by so much, and it is so far before the time to be reached.
+static const double LEFT = 64.0, GROWN = 8.0, BEFORE_LOCK_UP = 0.0001;
 // Newton iterations of a predicted point, sub-steps between two times.
 enum { MAX_CORRECTIONS = 6, MAX_SUBSTEPS = 10000 };
-
-// Measure the equations of a mechanism around the positions in a strip, which stay as they are.
-static void measure(strip *b, double size, size_t count, scales *s)
-{
-    double q[N][LANES];
-    memcpy(q, b->q, sizeof q);
-    for (int i = 0; i < N; i++)
-        for (size_t k = 0; k < count; k++) {
-            s->reference[i][k] = ANGULAR[i] ? 1 : size;
-            s->inverse[i][k] = 1 / s->reference[i][k];
-            b->q[i][k] += s->reference[i][k] * PROBE[i];
-        }
-    position_of_strip(b, count);
-    memset(s->magnitude, 0, sizeof s->magnitude);
-    memset(s->noise, 0, sizeof s->noise);
-    for (int e = 0; e < NONZEROS; e++) {
-        const int i = four_bar_pattern[e][0], j = four_bar_pattern[e][1];
-        for (size_t k = 0; k < count; k++) {
-            const double slope = fabs(b->Phi_q[e][k]), reference = s->reference[j][k];
-            s->magnitude[i][k] += slope * reference;
-            s->noise[i][k] += ROUNDING * slope * (reference + fabs(q[j][k]));
-        }
-    }
-    memcpy(b->q, q, sizeof q);
-}
-
-// Apply corrections until they are small, in scales of the coordinates; a point whose corrections
-// are stays where it is. Returns how many points are left that did not get there.
-static int correct(strip *b, const scales *s, size_t count, int max_iterations, outcome *o)
-{
-    double change[N][LANES], going[LANES], iterations[LANES];
-    int left = 1;
-    for (size_t k = 0; k < count; k++) {
-        going[k] = o->is_over[k] ? 0 : 1;
-        iterations[k] = 0;
-    }
-    for (int iteration = 0; left && iteration < max_iterations; iteration++) {
-        double larger[LANES] = { 0 };
-        position_of_strip(b, count);
-        factor_of_strip(b, count);
-        solve_of_strip(b, b->Phi, change, count);
-        for (int i = 0; i < N; i++)
-            for (size_t k = 0; k < count; k++) {
-                b->q[i][k] -= going[k] != 0 ? change[i][k] : 0;
-                const double scale = s->tolerance * s->reference[i][k];
-                const double allowed = scale + ROUNDING * fabs(b->q[i][k]);
-                larger[k] += fabs(change[i][k]) <= allowed ? 0 : 1;
-            }
-        left = 0;
-        for (size_t k = 0; k < count; k++) {
-            iterations[k] += going[k];
-            going[k] = larger[k] == 0 ? 0 : going[k];
-            left += going[k] != 0;
-        }
-    }
-    for (size_t k = 0; k < count; k++) {
-        o->iterations[k] = (int)iterations[k];
-        o->status[k] = going[k] != 0 ? FOUR_BAR_NOT_CONVERGED : FOUR_BAR_CONVERGED;
-    }
-    return left;
-}
-
-// Check that the equations hold and that Phi_q is regular, and solve for velocity and acceleration.
-static void complete(strip *b, const scales *s, size_t count, outcome *o)
-{
-    double right[M][LANES], answer[N][LANES];
-    double excess[LANES] = { 0 }, total[LANES] = { 0 };
-    position_of_strip(b, count);
-    factor_of_strip(b, count);
-    memset(o->residual, 0, sizeof o->residual);
-    memset(o->sensitivity, 0, sizeof o->sensitivity);
-    for (int i = 0; i < M; i++) {
-        const double part = fmax(RESIDUAL_FACTOR * s->tolerance, ROUNDING);
-        for (size_t k = 0; k < count; k++) {
-            const double allowed = part * s->magnitude[i][k] + s->noise[i][k];
-            const double size = fabs(b->Phi[i][k]);
-            o->residual[k] = size > o->residual[k] ? size : o->residual[k];
-            excess[k] += size <= allowed ? 0 : 1;
-            right[i][k] = s->magnitude[i][k] * PROBE[i];
-        }
-    }
-    solve_of_strip(b, right, answer, count);
-    nu_of_strip(b, count);
-    solve_of_strip(b, b->nu, b->q_dot, count);
-    gamma_of_strip(b, count);
-    solve_of_strip(b, b->gamma, b->q_ddot, count);
-    for (int i = 0; i < N; i++)
-        for (size_t k = 0; k < count; k++) {
-            const double size = fabs(answer[i][k]) * s->inverse[i][k];
-            o->sensitivity[k] = size <= o->sensitivity[k] ? o->sensitivity[k] : size;
-            total[k] += b->q[i][k] + b->q_dot[i][k] + b->q_ddot[i][k];
-        }
-    for (size_t k = 0; k < count; k++) {
-        const int holds = excess[k] == 0, finite = total[k] - total[k] == 0;
-        const int regular = o->sensitivity[k] <= TOO_NEAR;
-        if (o->status[k] != FOUR_BAR_CONVERGED)
-            continue;
-        o->status[k] = !(o->residual[k] - o->residual[k] == 0) ? FOUR_BAR_NOT_FINITE
-            : !holds ? FOUR_BAR_NOT_CONVERGED
-            : !regular ? FOUR_BAR_SINGULAR
-            : !finite ? FOUR_BAR_NOT_FINITE
-            : FOUR_BAR_CONVERGED;
-    }
-}
 
 // A good point of a motion: its numbers in the rows of a strip from t to determinants.
 enum { ROWS = offsetof(strip, F) / sizeof(double[LANES]) };
@@ -924,6 +871,7 @@ typedef union {
     double t, row[ROWS];
 } state;
 
+// Take up a lane of a strip as a good point.
 static void take_up(state *at, const strip *b, size_t k)
 {
     for (int i = 0; i < ROWS; i++)
@@ -938,220 +886,485 @@ static void put_at(strip *b, const state *at, size_t first, size_t end)
             ((double *)b)[(size_t)i * LANES + k] = at->row[i];
 }
 
-// Take the points of a strip from where they are to other times. Those that end too far from the
-// prediction q + h q_dot + h^2 q_ddot / 2 have not converged. Where the determinant of a block has
-// changed its sign, a singular configuration lies between; near one, the velocity must be where it
-// was predicted too, compared with the position's error.
-static void step(strip *b, const scales *s, const double *t, size_t count, outcome *o)
+// Keep the points of a strip, without what was computed there.
+static void keep(strip *to, const strip *b)
 {
-    double q[N][LANES], q_dot[N][LANES], determinants[BLOCKS > 0 ? BLOCKS : 1][LANES];
-    double h[LANES], error[LANES] = { 0 }, kink[LANES] = { 0 }, crossed[LANES] = { 0 };
-    memcpy(determinants, b->determinants, sizeof determinants);
-    for (size_t k = 0; k < count; k++) {
-        h[k] = t[k] - b->t[k];
-        b->t[k] = t[k];
-    }
-    for (int i = 0; i < N; i++)
-        for (size_t k = 0; k < count; k++) {
-            b->q[i][k] += h[k] * (b->q_dot[i][k] + 0.5 * h[k] * b->q_ddot[i][k]);
-            b->q_dot[i][k] += h[k] * b->q_ddot[i][k];
-        }
-    memcpy(q, b->q, sizeof q);
-    memcpy(q_dot, b->q_dot, sizeof q_dot);
-    correct(b, s, count, MAX_CORRECTIONS, o);
-    complete(b, s, count, o);
-    for (int i = 0; i < N; i++)
-        for (size_t k = 0; k < count; k++) {
-            const double size = fabs(b->q[i][k] - q[i][k]) * s->inverse[i][k];
-            const double turn = fabs(h[k] * (b->q_dot[i][k] - q_dot[i][k])) * s->inverse[i][k];
-            error[k] = size <= error[k] ? error[k] : size;
-            kink[k] = turn > kink[k] ? turn : kink[k];
-        }
-    for (int i = 0; i < BLOCKS; i++)
-        for (size_t k = 0; k < count; k++)
-            crossed[k] += (determinants[i][k] > 0 ? b->determinants[i][k] > 0
-                : b->determinants[i][k] < 0) ? 0 : 1;
-    for (size_t k = 0; k < count; k++)
-        if (!(error[k] <= LARGEST_ERROR))
-            o->status[k] = FOUR_BAR_NOT_CONVERGED;
-        else if ((o->sensitivity[k] > NEARLY_SINGULAR && kink[k] > KINK * error[k] + SMOOTH)
-            || (o->status[k] == FOUR_BAR_CONVERGED && crossed[k] != 0))
-            o->status[k] = FOUR_BAR_SINGULAR;
+    memcpy(to, b, ROWS * sizeof b->t);
 }
 
-// Take one point of a strip from a good point to a time, in sub-steps that are halved where they
-// fail and doubled where they do not.
+// Put the entries of matrices that never change in place.
+static void constants_of_strip(strip *b, size_t count)
+{
+    double matrices[MATRICES];
+    place_constants(b, matrices, count);
+}
+
+// What rates of points miss of their equations.
+static void missed_of_strip(const strip *b, const double (*weight)[LANES],
+    double *restrict by_velocity, double *restrict by_acceleration, size_t count)
+{
+    for (size_t k = 0; k < count; k++)
+        missed_at(b, weight, &by_velocity[k], &by_acceleration[k], k);
+}
+
+// Write rows where those of a time are wanted, which begin so much farther on.
+static void store(four_bar_output to, ptrdiff_t time, double (*rows)[LANES], size_t first,
+    size_t count)
+{
+    to.first += time;
+    store_rows(to, rows, NULL, N, first, count, 0);
+}
+
+// Whether a truth holds in any lane.
+static int any_lane(const double *truth, size_t count)
+{
+    double found = 0;
+    for (size_t k = 0; k < count; k++)
+        found += truth[k];
+    return found != 0;
+}
+
+// By what the numbers of a motion are judged; each point has its own.
+typedef struct {
+    double reference[N][LANES];  // scale of each coordinate: 1 rad, or the size of the mechanism
+    double inverse[N][LANES];    // and its inverse: a division takes as long as five products
+    double magnitude[M][LANES];  // what the terms of each equation contribute at a generic position
+    double noise[M][LANES];      // what rounding errors of the coordinates leave of each equation
+    double weight[M][LANES];     // of the square of what an equation of rates misses
+    double tolerance;
+} scales;
+
+// What became of points; those that are over are not looked at any more.
+typedef struct {
+    int status[LANES];
+    int iterations[LANES];
+    int is_over[LANES];
+    double residual[LANES];
+    double sensitivity[LANES];
+    double by_velocity[LANES];  // by how much velocities miss their equations, squared
+    double by_acceleration[LANES];
+} outcome;
+
+// Measure the equations of a mechanism around positions, which stay as they are.
+static void measure(strip *b, double size, scales *s, size_t lanes)
+{
+    double q[N][LANES];
+    memcpy(q, b->q, sizeof q);
+    for (int i = 0; i < N; i++)
+        for (size_t lane = 0; lane < lanes; lane++) {
+            s->reference[i][lane] = ANGULAR[i] ? 1.0 : size;
+            s->inverse[i][lane] = 1.0 / s->reference[i][lane];
+            b->q[i][lane] += s->reference[i][lane] * PROBE[i];
+        }
+    position_of_strip(b, lanes);
+    memset(s->magnitude, 0, sizeof s->magnitude);
+    memset(s->noise, 0, sizeof s->noise);
+    for (int e = 0; e < NONZEROS; e++) {
+        const int i = four_bar_pattern[e][0];
+        const int j = four_bar_pattern[e][1];
+        for (size_t lane = 0; lane < lanes; lane++) {
+            const double slope = fabs(b->Phi_q[e][lane]);
+            s->magnitude[i][lane] += slope * s->reference[j][lane];
+            s->noise[i][lane] += ROUNDING * slope * (s->reference[j][lane] + fabs(q[j][lane]));
+        }
+    }
+    for (int i = 0; i < M; i++) {
+        const double allowed = IS_REDUNDANT[i] ? AGREEMENT : SOLVED;
+        for (size_t lane = 0; lane < lanes; lane++) {
+            const double terms = allowed * s->magnitude[i][lane];
+            s->weight[i][lane] = 1.0 / (terms * allowed * s->magnitude[i][lane]);
+        }
+    }
+    memcpy(b->q, q, sizeof b->q);
+}
+
+// Apply corrections until they are small, in scales of the coordinates. A point whose corrections
+// are stays where it is.
+static void correct(strip *b, const scales *s, int most, outcome *o, size_t lanes)
+{
+    double iterations[LANES] = { 0 };
+    double going[LANES];
+    for (size_t lane = 0; lane < lanes; lane++)
+        going[lane] = o->is_over[lane] ? 0 : 1;
+    for (int iteration = 0; iteration < most; iteration++) {
+        if (!any_lane(going, lanes))
+            break;
+        double is_large[LANES] = { 0 };
+        position_of_strip(b, lanes);
+        factor_of_strip(b, lanes);
+        double change[N][LANES];
+        solve_of_strip(b->F, b->Phi, change, lanes);
+        for (int i = 0; i < N; i++)
+            for (size_t lane = 0; lane < lanes; lane++) {
+                b->q[i][lane] -= going[lane] != 0 ? change[i][lane] : 0.0;
+                const double allowed = s->tolerance * s->reference[i][lane]
+                    + ROUNDING * fabs(b->q[i][lane]);
+                is_large[lane] = fabs(change[i][lane]) <= allowed ? is_large[lane] : 1;
+            }
+        for (size_t lane = 0; lane < lanes; lane++) {
+            iterations[lane] += going[lane];
+            going[lane] = is_large[lane] != 0 ? going[lane] : 0;
+        }
+    }
+    for (size_t lane = 0; lane < lanes; lane++) {
+        o->iterations[lane] = (int)iterations[lane];
+        o->status[lane] = going[lane] != 0 ? FOUR_BAR_NOT_CONVERGED : FOUR_BAR_CONVERGED;
+    }
+}
+
+// Check that the equations hold and that Phi_q is regular; solve for the rates. These are looked
+// at: elimination with pivots chosen beforehand may lose all digits. They may miss their equations
+// by parts of their size, the sum of their components in scales; accelerations are measured by the
+// square of the velocities too, which gamma is made of.
+static void complete(strip *b, const scales *s, outcome *o, size_t lanes)
+{
+    double right[M][LANES];
+    double is_off[LANES] = { 0 };
+    double speed[LANES] = { 0 };
+    double gain[LANES] = { 0 };
+    position_of_strip(b, lanes);
+    factor_of_strip(b, lanes);
+    for (size_t lane = 0; lane < lanes; lane++) {
+        o->residual[lane] = 0.0;
+        o->sensitivity[lane] = 0.0;
+    }
+    const double terms = fmax(RESIDUAL_FACTOR * s->tolerance, ROUNDING);
+    for (int i = 0; i < M; i++)
+        for (size_t lane = 0; lane < lanes; lane++) {
+            const double allowed = terms * s->magnitude[i][lane] + s->noise[i][lane];
+            const double size = fabs(b->Phi[i][lane]);
+            o->residual[lane] = size > o->residual[lane] ? size : o->residual[lane];
+            is_off[lane] = size <= allowed ? is_off[lane] : 1;
+            right[i][lane] = s->magnitude[i][lane] * PROBE[i];
+        }
+    // A third right side, of the size of the equations' terms, shows how near to singular Phi_q is.
+    double answer[N][LANES];
+    solve_of_strip(b->F, right, answer, lanes);
+    nu_of_strip(b, lanes);
+    solve_of_strip(b->F, b->nu, b->q_dot, lanes);
+    gamma_of_strip(b, lanes);
+    solve_of_strip(b->F, b->gamma, b->q_ddot, lanes);
+    for (int i = 0; i < N; i++)
+        for (size_t lane = 0; lane < lanes; lane++) {
+            const double moved = fabs(answer[i][lane]) * s->inverse[i][lane];
+            o->sensitivity[lane] = moved <= o->sensitivity[lane] ? o->sensitivity[lane] : moved;
+            speed[lane] += fabs(b->q_dot[i][lane]) * s->inverse[i][lane];
+            gain[lane] += fabs(b->q_ddot[i][lane]) * s->inverse[i][lane];
+        }
+    missed_of_strip(b, s->weight, o->by_velocity, o->by_acceleration, lanes);
+    for (size_t lane = 0; lane < lanes; lane++) {
+        const double first = speed[lane] * speed[lane];
+        const double second = (gain[lane] + first) * (gain[lane] + first);
+        const int is_met = o->by_velocity[lane] <= first && o->by_acceleration[lane] <= second;
+        int found = is_met ? FOUR_BAR_CONVERGED : FOUR_BAR_SINGULAR;
+        found = isfinite(first + second) ? found : FOUR_BAR_NOT_FINITE;
+        found = o->sensitivity[lane] <= TOO_NEAR ? found : FOUR_BAR_SINGULAR;
+        found = is_off[lane] != 0 ? FOUR_BAR_NOT_CONVERGED : found;
+        found = isfinite(o->residual[lane]) ? found : FOUR_BAR_NOT_FINITE;
+        o->status[lane] = o->status[lane] == FOUR_BAR_CONVERGED ? found : o->status[lane];
+    }
+}
+
+// Take points from where they are to other times. Those that end too far from the prediction q + h
+// q_dot + h^2 q_ddot / 2 have not converged. Where the determinant of a block has changed its
+// sign, a singular configuration lies between; near one, the velocity must be where it was
+// predicted too, compared with the position's error.
+static void step(strip *b, const scales *s, const double *t, outcome *o, size_t lanes)
+{
+    double before[BLOCKS > 0 ? BLOCKS : 1][LANES];
+    memcpy(before, b->determinants, sizeof before);
+    double h[LANES];
+    for (size_t lane = 0; lane < lanes; lane++) {
+        h[lane] = t[lane] - b->t[lane];
+        b->t[lane] = t[lane];
+    }
+    for (int i = 0; i < N; i++)
+        for (size_t lane = 0; lane < lanes; lane++) {
+            b->q[i][lane] += h[lane] * (b->q_dot[i][lane] + 0.5 * h[lane] * b->q_ddot[i][lane]);
+            b->q_dot[i][lane] += h[lane] * b->q_ddot[i][lane];
+        }
+    double q[N][LANES];
+    memcpy(q, b->q, sizeof q);
+    double q_dot[N][LANES];
+    memcpy(q_dot, b->q_dot, sizeof q_dot);
+    correct(b, s, MAX_CORRECTIONS, o, lanes);
+    complete(b, s, o, lanes);
+    double error[LANES] = { 0 };
+    double kink[LANES] = { 0 };
+    double has_crossed[LANES] = { 0 };
+    for (int i = 0; i < N; i++)
+        for (size_t lane = 0; lane < lanes; lane++) {
+            const double apart = fabs(b->q[i][lane] - q[i][lane]) * s->inverse[i][lane];
+            const double turn = fabs(h[lane] * (b->q_dot[i][lane]
+                        - q_dot[i][lane])) * s->inverse[i][lane];
+            error[lane] = apart <= error[lane] ? error[lane] : apart;
+            kink[lane] = turn > kink[lane] ? turn : kink[lane];
+        }
+    for (int i = 0; i < BLOCKS; i++)
+        for (size_t lane = 0; lane < lanes; lane++) {
+            const int stays = before[i][lane] > 0.0 ? b->determinants[i][lane] > 0.0
+                : b->determinants[i][lane] < 0.0;
+            has_crossed[lane] = stays ? has_crossed[lane] : 1;
+        }
+    for (size_t lane = 0; lane < lanes; lane++) {
+        const int is_bent = o->sensitivity[lane] > NEARLY_SINGULAR
+            && kink[lane] > KINK * error[lane] + SMOOTH;
+        const int is_past = is_bent
+            || (o->status[lane] == FOUR_BAR_CONVERGED && has_crossed[lane] != 0);
+        o->status[lane] = error[lane] <= SMALL_ERROR
+            ? (is_past ? FOUR_BAR_SINGULAR : o->status[lane]) : FOUR_BAR_NOT_CONVERGED;
+    }
+}
+
+// Return the largest velocity of a point, in scales of the coordinates.
+static double speed_of(strip *b, const scales *s)
+{
+    double most = 0.0;
+    for (int i = 0; i < N; i++) {
+        const double speed = fabs(b->q_dot[i][0]) * s->inverse[i][0];
+        most = speed > most ? speed : most;
+    }
+    return most;
+}
+
+// Say whether a point that cannot be left by the smallest step is at a lock-up before a time.
+// There the equations must have values. Its speed was that before.
+static int locks_up(strip *b, const scales *s, double t, double smallest, double before)
+{
+    const double forward = t - b->t[0];
+    const double speed = speed_of(b, s);
+    double growth = 0.0;
+    for (int i = 0; i < N; i++)
+        if (fabs(b->q_dot[i][0]) * s->inverse[i][0] == speed) {
+            const double sign = b->q_dot[i][0] > 0.0 ? 1.0 : -1.0;
+            growth = b->q_ddot[i][0] * s->inverse[i][0] * sign;
+        }
+    const double left = forward * growth > 0.0 ? speed / (2.0 * fabs(growth)) : INFINITY;
+    if (!(left <= LEFT * smallest && speed >= GROWN * before))
+        return 0;
+    b->t[0] = t;
+    position_of_strip(b, 1);
+    double total = 0.0;
+    for (int i = 0; i < M; i++)
+        total += b->Phi[i][0];
+    return isfinite(total) && fabs(forward) - left > BEFORE_LOCK_UP / SMALLEST_PART * smallest;
+}
+
+// Take the scales of one lane.
+static void scales_of(scales *own, const scales *s, size_t k)
+{
+    own->tolerance = s->tolerance;
+    for (int i = 0; i < M; i++) {
+        own->magnitude[i][0] = s->magnitude[i][k];
+        own->noise[i][0] = s->noise[i][k];
+        own->weight[i][0] = s->weight[i][k];
+    }
+    for (int i = 0; i < N; i++) {
+        own->reference[i][0] = s->reference[i][k];
+        own->inverse[i][0] = s->inverse[i][k];
+    }
+}
+
+// Take one lane from a good point to a time, in sub-steps. These are halved where they fail and
+// doubled where they do not.
 static void advance(strip *b, const scales *s, state *at, double t, size_t k, outcome *o)
 {
-    const double smallest = fabs(t - at->t) * SMALLEST_PART;
-    double h = 0.5 * (t - at->t), matrices[MATRICES];
     strip alone;
     scales own;
     outcome found;
-    place_constants(&alone, matrices, 1);
-    for (int i = 0; i < M; i++)
-        own.magnitude[i][0] = s->magnitude[i][k], own.noise[i][0] = s->noise[i][k];
-    for (int i = 0; i < N; i++)
-        own.reference[i][0] = s->reference[i][k], own.inverse[i][0] = s->inverse[i][k];
-    own.tolerance = s->tolerance;
+    constants_of_strip(&alone, 1);
+    scales_of(&own, s, k);
     found.is_over[0] = 0;
-    o->iterations[k] = 0;
+    put_at(&alone, at, 0, 1);
+    const double before = speed_of(&alone, &own);
+    const double smallest = fabs(t - at->t) * SMALLEST_PART;
+    double h = 0.5 * (t - at->t);
+    int iterations = 0;
+    int is_stuck = 0;
     for (int n = 0; n < MAX_SUBSTEPS; n++) {
-        const int whole = fabs(h) >= fabs(t - at->t);
-        const double next = whole ? t : at->t + h;
+        const int is_whole = fabs(h) >= fabs(t - at->t);
+        const double following = is_whole ? t : at->t + h;
         put_at(&alone, at, 0, 1);
-        step(&alone, &own, &next, 1, &found);
-        const int good = found.status[0] == FOUR_BAR_CONVERGED;
-        o->iterations[k] += found.iterations[0];
-        if (good)
+        step(&alone, &own, &following, &found, 1);
+        const int is_good = found.status[0] == FOUR_BAR_CONVERGED;
+        iterations += found.iterations[0];
+        if (is_good)
             take_up(at, &alone, 0);
-        if (good ? whole : fabs(h) <= smallest)
+        is_stuck = !is_good && fabs(h) <= smallest;
+        if (is_stuck || (is_good && is_whole))
             break;
-        h *= good ? 2 : 0.5;
+        h *= is_good ? 2.0 : 0.5;
+    }
+    int status = found.status[0];
+    if (status == FOUR_BAR_CONVERGED && at->t != t)
+        status = FOUR_BAR_NOT_CONVERGED;
+    if (is_stuck) {
+        put_at(&alone, at, 0, 1);
+        if (locks_up(&alone, &own, t, smallest, before))
+            status = FOUR_BAR_LOCK_UP;
     }
     o->residual[k] = found.residual[0];
-    o->status[k] = found.status[0];
-    if (o->status[k] == FOUR_BAR_CONVERGED && at->t != t)
-        o->status[k] = FOUR_BAR_NOT_CONVERGED;
+    o->status[k] = status;
+    o->iterations[k] = iterations;
     take_up(at, &alone, 0);
     put_at(b, at, k, k + 1);
 }
 
-// Write the points of a strip at one time; variants that are over have no numbers.
-static void record(const four_bar_variants *all, strip *b, const outcome *o, size_t time,
+// Write points at one time, from a variant on; those that are over have no numbers.
+static void record(const four_bar_variants *m, strip *b, const outcome *o, size_t time,
     size_t first, size_t count)
 {
-    const four_bar_output to[3] = { all->q, all->q_dot, all->q_ddot };
-    double (*const rows[3])[LANES] = { b->q, b->q_dot, b->q_ddot };
-    for (int kind = 0; kind < 3; kind++) {
-        four_bar_output now = to[kind];
-        now.first += (ptrdiff_t)time * all->time;
-        store_rows(now, rows[kind], NULL, N, first, count, 0);
-        for (size_t k = 0; k < count; k++)
-            for (int i = 0; o->is_over[k] && i < N; i++)
-                now.first[i * now.entry + (ptrdiff_t)(first + k) * now.point] = NAN;
-    }
+    store(m->q, (ptrdiff_t)time * m->time, b->q, first, count);
+    store(m->q_dot, (ptrdiff_t)time * m->time, b->q_dot, first, count);
+    store(m->q_ddot, (ptrdiff_t)time * m->time, b->q_ddot, first, count);
     for (size_t k = 0; k < count; k++) {
-        const size_t place = time * all->variants + first + k;
-        all->residual[place] = o->is_over[k] ? NAN : o->residual[k];
-        all->status[place] = o->status[k];
-        all->iterations[place] = o->iterations[k];
+        const size_t place = time * m->variants + first + k;
+        m->residual[place] = o->is_over[k] ? NAN : o->residual[k];
+        m->status[place] = o->status[k];
+        m->iterations[place] = o->iterations[k];
+        if (o->is_over[k]) {
+            for (int i = 0; i < N; i++) {
+                m->q.first[i * m->q.entry + (ptrdiff_t)time * m->time
+                        + (ptrdiff_t)(first + k) * m->q.point] = NAN;
+                m->q_dot.first[i * m->q_dot.entry + (ptrdiff_t)time * m->time
+                        + (ptrdiff_t)(first + k) * m->q_dot.point] = NAN;
+                m->q_ddot.first[i * m->q_ddot.entry + (ptrdiff_t)time * m->time
+                        + (ptrdiff_t)(first + k) * m->q_ddot.point] = NAN;
+            }
+        }
     }
 }
 
 // Assemble variants from the guess, at the first time.
-static void assemble(const four_bar_variants *all, strip *b, scales *s, size_t first,
-    size_t count, outcome *o)
+static void assemble(const four_bar_variants *m, strip *b, scales *s, size_t first, size_t count,
+    outcome *o)
 {
-    double matrices[MATRICES], check[LANES] = { 0 };
-    place_constants(b, matrices, count);
-    read_rows(b->p, K, all->p, first, count, check);
-    s->tolerance = all->tolerance;
+    constants_of_strip(b, count);
+    s->tolerance = m->tolerance;
+    for (int i = 0; i < K; i++)
+        for (size_t k = 0; k < count; k++)
+            b->p[i][k] = m->p.first[i * m->p.entry + (ptrdiff_t)(first + k) * m->p.point];
     for (size_t k = 0; k < count; k++) {
-        b->t[k] = all->t[0];
+        b->t[k] = m->t[0];
         o->is_over[k] = 0;
         for (int i = 0; i < N; i++)
-            b->q[i][k] = all->guess[i];
+            b->q[i][k] = m->guess[i];
     }
-    measure(b, all->size, count, s);
-    correct(b, s, count, all->max_iterations, o);
-    complete(b, s, count, o);
-    measure(b, all->size, count, s);  // the guess may be rough
+    measure(b, m->size, s, count);
+    correct(b, s, m->max_iterations, o, count);
+    complete(b, s, o, count);
+    // The guess may be rough.
+    measure(b, m->size, s, count);
 }
 
-size_t four_bar_march(const four_bar_motion *motion)
+// Follow one motion; return how many points converged, from the first one on. The lanes are times
+// of the motion, as if each were a variant at its own: all have the same parameters, and what is
+// written for a variant is the time's.
+static size_t march(const four_bar_variants *m)
 {
-    // The lanes of a strip are times of the motion, as if each were a variant at its own.
-    const four_bar_variants all = {
-        .t = motion->t, .p = { motion->p, 1, 0 }, .guess = motion->guess, .size = motion->size,
-        .tolerance = motion->tolerance, .max_iterations = motion->max_iterations,
-        .q = motion->q, .q_dot = motion->q_dot, .q_ddot = motion->q_ddot,
-        .residual = motion->residual, .status = motion->status, .iterations = motion->iterations,
-    };
     strip b;
     scales s;
     outcome o;
     state at;
-    assemble(&all, &b, &s, 0, LANES, &o);
-    record(&all, &b, &o, 0, 0, 1);
+    assemble(m, &b, &s, 0, LANES, &o);
+    record(m, &b, &o, 0, 0, 1);
     take_up(&at, &b, 0);
     int status = o.status[0];
-    size_t done = status == FOUR_BAR_CONVERGED ? 1 : 0, width = 1;
-    while (status == FOUR_BAR_CONVERGED && done < motion->count) {
-        const size_t rest = motion->count - done, count = rest < width ? rest : width;
+    size_t done = status == FOUR_BAR_CONVERGED ? 1 : 0;
+    size_t width = 1;
+    while (status == FOUR_BAR_CONVERGED && done < m->count) {
+        const size_t count = m->count - done < width ? m->count - done : width;
         size_t good = 0;
         put_at(&b, &at, 0, count);
-        step(&b, &s, motion->t + done, count, &o);
+        step(&b, &s, m->t + done, &o, count);
         while (good < count && o.status[good] == FOUR_BAR_CONVERGED)
             good++;
         if (good > 0) {
-            record(&all, &b, &o, 0, done, good);
+            record(m, &b, &o, 0, done, good);
             take_up(&at, &b, good - 1);
             done += good;
             // The fewer iterations, the more points the next prediction can serve.
-            if (good < count || o.iterations[good - 1] > 3)
+            if (good < count || o.iterations[good - 1] > 3) {
                 width = good > 1 ? good / 2 : 1;
-            else
+            } else {
                 width = 2 * width < LANES ? 2 * width : LANES;
+            }
         } else if (count > 1) {
             width = 1;
         } else {
-            advance(&b, &s, &at, motion->t[done], 0, &o);
-            record(&all, &b, &o, 0, done, 1);
+            advance(&b, &s, &at, m->t[done], 0, &o);
+            record(m, &b, &o, 0, done, 1);
             status = o.status[0];
-            done += status == FOUR_BAR_CONVERGED;
+            if (status == FOUR_BAR_CONVERGED)
+                done++;
         }
     }
-    for (size_t k = done + 1; k < motion->count; k++)
-        motion->status[k] = FOUR_BAR_NOT_REACHED;
+    for (size_t k = done + 1; k < m->count; k++)
+        m->status[k] = FOUR_BAR_NOT_REACHED;
     return done;
 }
 
 // Let the variants that failed at a time rest at the guess, where they disturb no others.
-static void put_to_rest(const four_bar_variants *all, strip *b, outcome *o, size_t count)
+static void put_to_rest(const four_bar_variants *m, strip *b, outcome *o, size_t count)
 {
     for (size_t k = 0; k < count; k++) {
         if (o->is_over[k])
             o->status[k] = FOUR_BAR_NOT_REACHED;
-        else if (o->status[k] == FOUR_BAR_CONVERGED)
-            continue;
-        o->is_over[k] = 1;
-        for (int i = 0; i < N; i++) {
-            b->q[i][k] = all->guess[i];
-            b->q_dot[i][k] = b->q_ddot[i][k] = 0;
+        if (o->status[k] != FOUR_BAR_CONVERGED) {
+            o->is_over[k] = 1;
+            for (int i = 0; i < N; i++) {
+                b->q[i][k] = m->guess[i];
+                b->q_dot[i][k] = 0.0;
+                b->q_ddot[i][k] = 0.0;
+            }
         }
     }
 }
 
-size_t four_bar_march_variants(const four_bar_variants *all)
+// Follow the motions of variants; return how many converged at all times.
+size_t four_bar_march_variants(const four_bar_variants *m)
 {
-    strip b, from;
+    strip b;
+    strip before;
     scales s;
     outcome o;
     state at;
-    double times[LANES];
     size_t good = 0;
-    for (size_t first = 0; first < all->variants; first += LANES) {
-        const size_t rest = all->variants - first, count = rest < LANES ? rest : LANES;
-        assemble(all, &b, &s, first, count, &o);
-        put_to_rest(all, &b, &o, count);
-        record(all, &b, &o, 0, first, count);
-        for (size_t time = 1; time < all->count; time++) {
-            memcpy(&from, &b, ROWS * sizeof b.t);
+    for (size_t first = 0; first < m->variants; first += LANES) {
+        const size_t count = m->variants - first < LANES ? m->variants - first : LANES;
+        assemble(m, &b, &s, first, count, &o);
+        put_to_rest(m, &b, &o, count);
+        record(m, &b, &o, 0, first, count);
+        for (size_t time = 1; time < m->count; time++) {
+            keep(&before, &b);
+            double t[LANES];
+            for (size_t lane = 0; lane < LANES; lane++)
+                t[lane] = m->t[time];
+            step(&b, &s, t, &o, count);
             for (size_t k = 0; k < count; k++)
-                times[k] = all->t[time];
-            step(&b, &s, times, count, &o);
-            for (size_t k = 0; k < count; k++)
-                if (!o.is_over[k] && o.status[k] != FOUR_BAR_CONVERGED) {
-                    take_up(&at, &from, k);
-                    advance(&b, &s, &at, times[k], k, &o);
+                if (o.status[k] != FOUR_BAR_CONVERGED && !o.is_over[k]) {
+                    take_up(&at, &before, k);
+                    advance(&b, &s, &at, m->t[time], k, &o);
                 }
-            put_to_rest(all, &b, &o, count);
-            record(all, &b, &o, time, first, count);
+            put_to_rest(m, &b, &o, count);
+            record(m, &b, &o, time, first, count);
         }
         for (size_t k = 0; k < count; k++)
-            good += !o.is_over[k];
+            if (!o.is_over[k])
+                good++;
     }
     return good;
+}
+
+size_t four_bar_march(const four_bar_motion *motion)
+{
+    const four_bar_variants m = {
+        .count = motion->count, .t = motion->t, .p = { motion->p, 1, 0 }, .guess = motion->guess,
+        .size = motion->size, .tolerance = motion->tolerance,
+        .max_iterations = motion->max_iterations,
+        .q = motion->q, .q_dot = motion->q_dot, .q_ddot = motion->q_ddot,
+        .residual = motion->residual, .status = motion->status, .iterations = motion->iterations,
+    };
+    return march(&m);
 }
 

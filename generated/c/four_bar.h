@@ -80,10 +80,13 @@ void four_bar_solve(const four_bar_system *system);
 // What became of a point in time.
 enum {
     FOUR_BAR_CONVERGED = 0,      // position, velocity and acceleration were found
-    FOUR_BAR_NOT_CONVERGED = 1,  // no position was found that continues the motion
-    FOUR_BAR_SINGULAR = 2,       // Phi_q is singular: lock-up, bifurcation or dependent constraints
+    FOUR_BAR_NOT_CONVERGED = 1,  // no position was found, or none that continues the motion
+    FOUR_BAR_SINGULAR = 2,       // Phi_q is singular (lock-up, bifurcation, dependent constraints), or
+                                   // so nearly that the rates found do not meet their equations
     FOUR_BAR_NOT_FINITE = 3,     // an equation or a derivative is not a finite number
     FOUR_BAR_NOT_REACHED = 4,    // not tried, because an earlier point failed
+    FOUR_BAR_LOCK_UP = 7,        // the drivers demand what the joints cannot give: velocities grow
+                                   // beyond all bounds before this time
 };
 
 // A motion over the times t, rising or falling, with one set of parameters. Newton starts from the

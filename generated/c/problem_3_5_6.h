@@ -76,10 +76,13 @@ void problem_3_5_6_solve(const problem_3_5_6_system *system);
 // What became of a point in time.
 enum {
     PROBLEM_3_5_6_CONVERGED = 0,      // position, velocity and acceleration were found
-    PROBLEM_3_5_6_NOT_CONVERGED = 1,  // no position was found that continues the motion
-    PROBLEM_3_5_6_SINGULAR = 2,       // Phi_q is singular: lock-up, bifurcation or dependent constraints
+    PROBLEM_3_5_6_NOT_CONVERGED = 1,  // no position was found, or none that continues the motion
+    PROBLEM_3_5_6_SINGULAR = 2,       // Phi_q is singular (lock-up, bifurcation, dependent constraints), or
+                                   // so nearly that the rates found do not meet their equations
     PROBLEM_3_5_6_NOT_FINITE = 3,     // an equation or a derivative is not a finite number
     PROBLEM_3_5_6_NOT_REACHED = 4,    // not tried, because an earlier point failed
+    PROBLEM_3_5_6_LOCK_UP = 7,        // the drivers demand what the joints cannot give: velocities grow
+                                   // beyond all bounds before this time
 };
 
 // A motion over the times t, rising or falling, with one set of parameters. Newton starts from the

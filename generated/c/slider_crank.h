@@ -80,10 +80,13 @@ void slider_crank_solve(const slider_crank_system *system);
 // What became of a point in time.
 enum {
     SLIDER_CRANK_CONVERGED = 0,      // position, velocity and acceleration were found
-    SLIDER_CRANK_NOT_CONVERGED = 1,  // no position was found that continues the motion
-    SLIDER_CRANK_SINGULAR = 2,       // Phi_q is singular: lock-up, bifurcation or dependent constraints
+    SLIDER_CRANK_NOT_CONVERGED = 1,  // no position was found, or none that continues the motion
+    SLIDER_CRANK_SINGULAR = 2,       // Phi_q is singular (lock-up, bifurcation, dependent constraints), or
+                                   // so nearly that the rates found do not meet their equations
     SLIDER_CRANK_NOT_FINITE = 3,     // an equation or a derivative is not a finite number
     SLIDER_CRANK_NOT_REACHED = 4,    // not tried, because an earlier point failed
+    SLIDER_CRANK_LOCK_UP = 7,        // the drivers demand what the joints cannot give: velocities grow
+                                   // beyond all bounds before this time
 };
 
 // A motion over the times t, rising or falling, with one set of parameters. Newton starts from the

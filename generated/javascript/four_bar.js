@@ -361,23 +361,25 @@ const four_bar = (() => {
        anything is out of the ordinary, dense matrices with pivoting have the last word. */
     const solver = (() => {
         const CONVERGED = 0, NOT_CONVERGED = 1, SINGULAR = 2, NOT_FINITE = 3, NOT_REACHED = 4, AT_CORNER = 5;
+        const NOT_ASSEMBLED = 6, LOCK_UP = 7;
         // the criteria of the runtime; residuals at the end are relative to their terms
-        const ALLOWED_PART = 0.25, ARC_CORRECTIONS = 12, AROUND = 0.002,
+        const AGREEMENT = 1e-06, ALLOWED_PART = 0.25, ARC_CORRECTIONS = 12, AROUND = 0.002,
             AROUND_OFFSETS = [-2.0, -1.0, 1.0, 2.0], ASTRAY = 5.0, AS_NEAR = 1.1, AT_EVENT = 1e-09,
             BEND = 0.01, BESIDE = [0.0, -1e-08, 1e-08, -1e-06, 1e-06, -1e-05], CONSTANT = 1e-12,
-            CORNER = 1e-09, FAR = 0.7853981633974483, FIRST_ARC = 0.01, INVOLVED = 0.02,
+            CORNER = 1e-09, FAR = 0.7853981633974483, FIRST_ARC = 0.01, FOLDED = 1e-09, INVOLVED = 0.02,
             IN_RANGE = 1e-06, KINK = 8.0, LARGEST_ANGLE = 0.5, LARGE_ERROR = 0.5, LATE = 1e-06,
-            LONGEST_ARC = 0.05, MAX_ARCS = 400, MAX_CORRECTIONS = 6, MAX_ITERATIONS = 25,
-            MAX_SUBSTEPS = 10000, MIRRORED = 2.0, MIRROR_STEP = 1e-05, MOST_MIRRORED = 300,
-            MOST_TURNED = 300, NEARLY_SINGULAR = 30.0, NEAR_ANGLE = 0.5235987755982988, NEAR_PART = 0.1,
-            NUDGE = 0.3, OTHER_SIZE = 100.0, PATIENCE = 8, RESIDUAL_FACTOR = 10.0, RESTARTS = 4,
-            ROOT_LENGTH = 1e-13, ROOT_STEPS = 80, ROUNDING = 3.552713678800501e-15,
-            SAME_POSITION = 1e-06, SAME_TIME = 8.881784197001252e-16, SETTLED = 0.5,
-            SHORTEST_ARC = 1e-09, SHORTEST_STEP = 9.5367431640625e-07,
+            LONGEST_ARC = 0.05, LONGEST_P = 2.0, MAX_ARCS = 400, MAX_CORRECTIONS = 6,
+            MAX_ITERATIONS = 25, MAX_SUBSTEPS = 10000, MIRRORED = 2.0, MIRROR_STEP = 1e-05,
+            MOST_MIRRORED = 300, MOST_TURNED = 300, NEARLY_SINGULAR = 30.0,
+            NEAR_ANGLE = 0.5235987755982988, NEAR_PART = 0.1, NUDGE = 0.3, OTHER_SIZE = 100.0,
+            PATIENCE = 8, RESIDUAL_FACTOR = 10.0, RESTARTS = 4, ROOT_LENGTH = 1e-13, ROOT_STEPS = 80,
+            ROUNDING = 3.552713678800501e-15, SAME_POSITION = 1e-06, SAME_TIME = 8.881784197001252e-16,
+            SETTLED = 0.5, SHORTEST_ARC = 1e-09, SHORTEST_STEP = 9.5367431640625e-07,
             SINGULAR_SENSITIVITY = 10000000.0, SMALLEST_PART = 9.5367431640625e-07,
             SMALL_CORRECTION = 1e-12, SMALL_ERROR = 0.05, SMALL_PART = 1e-08, SMOOTH = 1e-09,
-            SPATIAL_COORDINATES = 7, STEEP = 1000000.0, STRAIGHT = 0.98, SUFFICIENT = 0.0001,
-            TOLERABLE_CORRECTION = 1e-07, TOLERANCE = 1e-10, TOO_NEAR = 100000.0, WILD = 1000.0;
+            SOLVED = 1e-10, SPATIAL_COORDINATES = 7, STEEP = 1000000.0, STRAIGHT = 0.98,
+            SUFFICIENT = 0.0001, THROWN = 10.0, TOLERABLE_CORRECTION = 1e-07, TOLERANCE = 1e-10,
+            TOO_NEAR = 100000.0, WILD = 1000.0;
         const ASSEMBLED = RESIDUAL_FACTOR * TOLERANCE;
 
         const norm = vector => Math.hypot(...vector);
@@ -569,12 +571,14 @@ const four_bar = (() => {
                 Object.assign(this, { model, p, n, m });
                 // Euler parameters, the last of a body in space, are cosines and sines of half angles.
                 const ofEuler = ([, first, count], k) => count === SPATIAL_COORDINATES && k >= first + 3 && k < first + count;
-                this.angular = model.COORDINATES.map((name, k) => {
-                    return model.UNITS[name] === "rad" || model.BODIES.some(body => ofEuler(body, k));
+                const isAngle = name => model.UNITS[name] === "rad";
+                this.angular = model.COORDINATES.map((name, k) => isAngle(name) || model.BODIES.some(body => ofEuler(body, k)));
+                this.covers = model.BODIES.filter(body => body[2] === SPATIAL_COORDINATES).map(([, first]) => {
+                    return [3, 4, 5, 6].map(k => first + k);
                 });
                 const isOwned = k => model.BODIES.some(([, first, count]) => k >= first && k < first + count);
                 this.mayTurn = model.COORDINATES.map((name, k) => {
-                    return this.angular[k] || (model.UNITS[name] === "" && !isOwned(k));
+                    return isAngle(name) || (model.UNITS[name] === "" && !isOwned(k));
                 });
                 this.size = rounded(sizeOf(model, this.angular, x => this.evaluate(x, t), Array.from(q))) || 1;
                 this.reference = Float64Array.from(this.angular, isAngle => (isAngle ? 1 : this.size));
@@ -587,6 +591,9 @@ const four_bar = (() => {
                 this.noise = new Float64Array(m);
                 this.limit = new Float64Array(m).fill(Infinity);
                 this.sums = new Float64Array(m);
+                this.none = new Float64Array(n);
+                // By what part of their terms equations of rates may be missed.
+                this.parts = Float64Array.from(model.EQUATIONS, name => ((model.REDUNDANT ?? []).includes(name) ? AGREEMENT : SOLVED));
                 const generic = this.evaluate(this.place.map((_, k) => q[k] + this.reference[k] * this.probe[k]), t);
                 if (!allFinite(generic.Phi) || !allFinite(generic.Phi_q)) return;
                 const own = this.terms(generic, this.reference).map(rounded);
@@ -657,19 +664,39 @@ const four_bar = (() => {
                 return most;
             }
 
+            /* The way from a guess to a position as a mechanism shows it: whole turns of an angle are no
+               way, and Euler parameters p and -p are one orientation. */
+            apart(q, guess) {
+                const turns = (x, k) => (this.angular[k] ? 2 * Math.PI * Math.round(x / (2 * Math.PI)) : 0);
+                const way = Float64Array.from(q, (x, k) => x - guess[k] - turns(x - guess[k], k));
+                for (const cover of this.covers) {
+                    const along = cover.reduce((sum, k) => sum + q[k] * guess[k], 0);
+                    for (const k of cover) way[k] = along < 0 ? q[k] + guess[k] : q[k] - guess[k];
+                }
+                return way;
+            }
+
+            /* How long that way is, in scales. */
+            away(q, guess, scale = this.near) {
+                return largest(this.apart(q, guess).map((x, k) => x / scale[k]));
+            }
+
             isFar(q, guess) {
-                return this.mayTurn.some((may, k) => may && Math.abs(q[k] - guess[k]) > FAR);
+                const way = this.apart(q, guess);
+                return this.mayTurn.some((may, k) => may && Math.abs(way[k]) > FAR);
             }
 
             /* Whether a guess shows a branch, and a position found from it lies on another. */
             leavesBranch(guess, found) {
+                if (this.model.REDUNDANT) return false;  // nothing has a determinant but the others' rows
                 const wanted = this.determinants(guess), here = this.determinants(found);
-                return wanted.every(x => x !== 0) && wanted.some((x, k) => Math.sign(x) !== Math.sign(here[k]));
+                const shows = wanted.every((x, k) => x !== 0 && !(Math.abs(x) <= FOLDED * Math.abs(here[k])));
+                return shows && wanted.some((x, k) => Math.sign(x) !== Math.sign(here[k]));
             }
 
             /* Whether a position found from a guess is not what the guess shows. */
             strays(guess, found) {
-                const isFar = this.isFar(found.q, guess.q) || this.distance(found.q, guess.q, this.near) > ASTRAY;
+                const isFar = this.isFar(found.q, guess.q) || this.away(found.q, guess.q) > ASTRAY;
                 return isFar || this.leavesBranch(guess, found);
             }
 
@@ -711,10 +738,10 @@ const four_bar = (() => {
             return allFinite(following.Phi) ? following : null;
         };
 
-        /* The whole correction. */
+        /* The whole correction; of redundant equations that which misses all of them least. */
         function plainStep(equations, at) {
-            const factors = equations.factors(at), right = independent(equations.model, at.Phi);
-            const step = solve(factors, right.map(value => -value));
+            const { model } = equations, factors = equations.factors(at), right = at.Phi.map(value => -value);
+            const step = model.REDUNDANT ? leastSquares(model.rows_of(at, "Phi_q"), right) : solve(factors, right);
             if (factors.dependent.length || !allFinite(step)) return whySingular(at);
             const following = moved(equations, at, step);
             return following ? [following, norm(step)] : NOT_FINITE;
@@ -763,26 +790,62 @@ const four_bar = (() => {
            the assembly on the other side of the nearest singular position is looked at too. `other` is
            another one that is as near to the guess. */
         function assemble(equations, t, guess) {
-            const away = q => equations.distance(q, guess, equations.near);
             const plain = iterate(equations, t, guess), isFound = plain.status === CONVERGED;
-            if (!plain.last || (isFound && away(plain.last.q) <= SETTLED)) return plain;
-            let good = [plain];
-            if (!isFound || equations.strays(plain.points[0], plain.last)) {
-                const attempts = safeguarded(equations, t, guess, isFound);
-                good = ordered(equations, plain.points[0], [plain, ...attempts]);
+            if (!plain.last || (isFound && equations.distance(plain.last.q, guess, equations.near) <= SETTLED)) return plain;
+            const meant = turned(equations, plain.points);
+            if (meant) {
+                const attempt = assemble(equations, t, meant);
+                if (attempt.status === CONVERGED) attempt.last = unwound(equations, t, attempt.last, guess);
+                return attempt;
+            }
+            const away = q => equations.away(q, guess);
+            const isSound = isFound && !isThrown(equations, plain.points);
+            let good = ordered(equations, plain.points[0], [plain]);
+            if (!isSound || equations.strays(plain.points[0], plain.last)) {
+                const attempts = safeguarded(equations, t, guess, isSound);
+                const found = ordered(equations, plain.points[0], isSound ? [plain, ...attempts] : attempts);
+                if (found.length) good = found;
                 if (!good.length) return leastMissed(equations, attempts);
             }
             const mirrored = equations.otherSide(good[0].last), near = Math.max(1, away(good[0].last.q));
             if (mirrored && away(mirrored) <= MIRRORED * near) {
                 const beyond = iterate(equations, t, mirrored);
-                if (beyond.last && away(beyond.last.q) <= Math.min(AS_NEAR * near, MIRRORED)) {
+                if (beyond.last && !isThrown(equations, beyond.points) && away(beyond.last.q) <= Math.min(AS_NEAR * near, MIRRORED)) {
                     good = ordered(equations, plain.points[0], [...good, beyond]);
                 }
             }
             const [first, ...rest] = good, reach = AS_NEAR * away(first.last.q);
-            const isOther = q => equations.distance(q, first.last.q) > SAME_POSITION && away(q) <= reach;
+            const isOther = q => equations.away(q, first.last.q, equations.reference) > SAME_POSITION && away(q) <= reach;
             first.other = rest.find(({ last }) => isOther(last.q))?.last ?? null;
             return first;
+        }
+
+        /* Whether a way went so far that rounding errors decide where it ends. */
+        function isThrown(equations, way) {
+            return way.some(at => !(equations.distance(at.q, way[0].q, equations.near) <= THROWN));
+        }
+
+        /* A guess with angles turned by whole turns towards its first correction, where the equations say
+           which turn is meant and miss less then; null where there is none. */
+        function turned(equations, way) {
+            const weights = equations.weights(), missed = ({ Phi }) => norm(weights.map((x, i) => x * Phi[i]));
+            const turns = way[0].q.map((x, k) => Math.round((way[Math.min(1, way.length - 1)].q[k] - x) / (2 * Math.PI)));
+            let guess = way[0];
+            const at = (some, count) => {
+                return equations.evaluate(guess.q.map((x, k) => x + (some.includes(k) ? 2 * Math.PI * count(k) : 0)), guess.t);
+            };
+            const isBound = k => {
+                const { Phi } = at([k], () => 1);
+                return !(norm(weights.map((x, i) => x * (Phi[i] - guess.Phi[i]))) <= SAME_POSITION);
+            };
+            const columns = [...turns.keys()].filter(k => equations.angular[k] && turns[k] && isBound(k));
+            for (const some of [columns, ...(columns.length <= MOST_TURNED ? columns.map(k => [k]) : [])]) {
+                const other = at(some, k => turns[k]);
+                if (!(missed(other) < (1 - SUFFICIENT) * missed(guess))) continue;
+                guess = other;
+                for (const k of some) turns[k] = 0;
+            }
+            return guess === way[0] ? null : Float64Array.from(guess.q);
         }
 
         /* Safeguarded attempts, from further and further away until one converges. */
@@ -810,9 +873,9 @@ const four_bar = (() => {
             const good = attempts.filter(({ status }) => status === CONVERGED);
             const orders = new Map(good.map(attempt => {
                 const at = attempt.last = unwound(equations, guess.t, attempt.last, guess.q);
-                const away = +equations.distance(at.q, guess.q, equations.near).toFixed(6);
+                const away = +equations.away(at.q, guess.q).toFixed(6);
                 const isFar = equations.isFar(at.q, guess.q), leaves = !isFar && equations.leavesBranch(guess, at);
-                return [attempt, [Math.min(away, 1), isFar, leaves, +equations.distance(at.q, guess.q).toFixed(6)]];
+                return [attempt, [Math.min(away, 1), isFar, leaves, +equations.away(at.q, guess.q, equations.reference).toFixed(6)]];
             }));
             return good.sort((one, other) => {
                 const [a, b] = [orders.get(one), orders.get(other)], k = a.findIndex((x, i) => x !== b[i]);
@@ -832,6 +895,19 @@ const four_bar = (() => {
                 const turned = iterate(equations, t, q, MAX_CORRECTIONS);
                 if (turned.status === CONVERGED && equations.distance(turned.last.q, q) <= SAME_POSITION) at = turned.last;
             }
+            return covered(equations, t, at, guess);
+        }
+
+        /* Give Euler parameters the signs of a guess's, as far as the equations allow it. Where they are as
+           far from it either way, the largest one becomes positive. */
+        function covered(equations, t, at, guess) {
+            for (const cover of equations.covers) {
+                const along = cover.reduce((sum, k) => sum + at.q[k] * guess[k], 0);
+                const most = cover.reduce((best, k) => (Math.abs(at.q[k]) > Math.abs(at.q[best]) ? k : best));
+                if ((Math.abs(along) > SAME_POSITION ? along : at.q[most]) >= 0) continue;
+                const other = equations.evaluate(at.q.map((x, k) => (cover.includes(k) ? -x : x)), t);
+                if (allFinite(other.Phi) && equations.holds(other, ASSEMBLED)) at = other;
+            }
             return at;
         }
 
@@ -845,6 +921,7 @@ const four_bar = (() => {
                 this.residual = Math.max(ASSEMBLED, ROUNDING);
                 const vector = () => new Float64Array(equations.n);
                 [this.change, this.predicted, this.rounding, this.expected] = [vector(), vector(), vector(), vector()];
+                this.missing = new Float64Array(equations.m);
                 this.sides = equations.magnitude.map((x, i) => x * equations.probe[i]);
             }
 
@@ -904,7 +981,25 @@ const four_bar = (() => {
                     sum += at.q_dot[k] + at.q_ddot[k];
                 }
                 if (!(at.sensitivity < SINGULAR_SENSITIVITY)) return whySingular(at);
-                return Number.isFinite(sum) ? CONVERGED : NOT_FINITE;
+                if (!Number.isFinite(sum)) return NOT_FINITE;
+                return this.areMet(at) ? CONVERGED : SINGULAR;
+            }
+
+            /* Whether velocity and acceleration meet Phi_q x = b: elimination with pivots chosen beforehand may
+               lose all digits. Accelerations are measured by the square of the velocities too, which gamma
+               is made of. */
+            areMet(at) {
+                const { equations } = this, { PATTERN } = equations.model, { m, none } = equations;
+                const terms = equations.terms(at, equations.reference), missing = this.missing;
+                const speed = equations.distance(at.q_dot, none), growth = equations.distance(at.q_ddot, none) + speed * speed;
+                for (const [x, b, size] of [[at.q_dot, at.nu, speed], [at.q_ddot, at.gamma, growth]]) {
+                    for (let i = 0; i < m; i += 1) missing[i] = -b[i];
+                    for (let k = 0; k < PATTERN.length; k += 1) missing[PATTERN[k][0]] += at.Phi_q[k] * x[PATTERN[k][1]];
+                    for (let i = 0; i < m; i += 1) {
+                        if (!(Math.abs(missing[i]) <= equations.parts[i] * terms[i] * size)) return false;
+                    }
+                }
+                return true;
             }
 
             /* Take a step from a good point: `to` counts only where it continues the motion. `to.isThere`
@@ -971,6 +1066,18 @@ const four_bar = (() => {
 
         /* ---- the whole grid ---- */
 
+        /* A guess with Euler parameters of a length near one: any length is an orientation. By their largest
+           first, since the squares of large ones overflow. */
+        function oriented(model, guess) {
+            const q = Float64Array.from(guess);
+            for (const [, first] of model.BODIES.filter(body => body[2] === SPATIAL_COORDINATES)) {
+                const p = q.subarray(first + 3, first + 7), most = Math.max(...p.map(Math.abs));
+                const rest = Math.sqrt(p.reduce((sum, x) => sum + (x / most) ** 2, 0)), length = most * rest;
+                if (length > LONGEST_P || length < 1 / LONGEST_P) p.forEach((x, k) => { p[k] = x / most / rest; });
+            }
+            return q;
+        }
+
         /* The times at which the velocity of a driver jumps, as the runtime finds them. */
         function cornersOf(model, times, p, guess) {
             if (!model.CORNERS) return times.map(() => 0);
@@ -996,6 +1103,7 @@ const four_bar = (() => {
                 status: new Int32Array(count).fill(NOT_REACHED), iterations: new Int32Array(count),
                 failed: null, near: [], other: null, strays: false,
             };
+            guess = oriented(model, guess);
             const corners = cornersOf(model, Float64Array.from(times), p, guess);
             const timeOf = k => times[k] + corners[k];
             let outcome = start(model, p, guess, timeOf(0));
@@ -1060,7 +1168,8 @@ const four_bar = (() => {
             const rough = new Problem(model, p, guess, t);
             const attempt = assemble(rough, t, Float64Array.from(guess)), iterations = attempt.corrections.length;
             if (attempt.status !== CONVERGED) {
-                return { status: attempt.status, iterations, equations: rough, state: null, position: null, nearest: attempt.last };
+                const status = attempt.status === NOT_CONVERGED ? NOT_ASSEMBLED : attempt.status;
+                return { status, iterations, equations: rough, state: null, position: null, nearest: attempt.last };
             }
             const march = new March(rough), at = attempt.last;
             march.isDense = true;
@@ -1335,8 +1444,8 @@ const four_bar = (() => {
             const { failed, status } = motion, event = failed && !failed.isExhausted ? endOf(motion) : null;
             if (!event || failed.position || failed.status === NOT_FINITE) return event;
             const isThere = Math.abs(event.t - failed.t) <= AT_EVENT * Math.max(Math.abs(event.t), Math.abs(failed.t));
-            const isSingular = event.kind === "bifurcation" || (event.kind === "lock-up" && isThere);
-            status[failed.index] = failed.status = isSingular ? SINGULAR : NOT_CONVERGED;
+            const reached = event.kind === "lock-up" && !isThere ? LOCK_UP : SINGULAR;
+            status[failed.index] = failed.status = event.kind === "branch switch" ? NOT_CONVERGED : reached;
             return event;
         }
 

@@ -33,7 +33,7 @@ import numpy as np
 
 NAME = "bennett"
 FORMAT = 3
-FINGERPRINT = "81a512188b0abac49b40e0c69650d777"
+FINGERPRINT = "e99b79b3ab1b0d6c1a095e926a25e8eb"
 N_COORDINATES, N_EQUATIONS = 22, 25
 COORDINATES = (
     "x_link_1", "y_link_1", "z_link_1", "e0_link_1", "e1_link_1", "e2_link_1", "e3_link_1",
@@ -58,12 +58,10 @@ UNITS = dict(zip(COORDINATES + PARAMETERS, (
 )))
 DEFAULTS = np.array((), dtype=float)
 GUESS = np.array((
-    0.2193956404725932, 0.11985638465105075, 0.0, 0.9191910317505647, 0.30639701058352153,
-    0.07823600133877857, 0.23470800401633574, -0.15477638029218488, -0.013617837745101669,
-    0.04668972941177695, 0.1796801993655045, 7.099155038420489e-17, -0.324811314606799,
-    -0.9285540565090304, -0.4, -8.326672684688674e-17, -6.245004513516506e-17,
-    0.07819057982900908, -0.05864293487175693, 0.5971272947953618, 0.7961697263938158,
-    2.945803635204313,
+    0.21939564, 0.119856385, 0.0, 0.9191910317591525, 0.30639701049572476, 0.07823600128147948,
+    0.23470800411641674, -0.15477638, -0.013617838, 0.046689729, 0.17968019933130705, 0.0,
+    -0.32481131477451036, -0.9285540564569819, -0.4, -0.0, -0.0, 0.07819057976069077,
+    -0.05864293497751978, 0.5971272948450836, 0.7961697263554436, 2.945803635,
 ), dtype=float)
 # row, column of the entries of Phi_q that are not identically zero
 PATTERN = np.array((
@@ -1830,7 +1828,7 @@ def solve(nonzeros, b):
     nonzeros (..., 127) are the entries of Phi_q in the order of PATTERN, b is (..., 25).
     Where Phi_q is singular, x is not finite or wrong: check Phi_q x = b where that may happen.
     """
-    nonzeros, b = np.asarray(nonzeros, dtype=float), np.asarray(b, dtype=float)
+    nonzeros, b = _system(nonzeros, b)
     with np.errstate(all="ignore"):
         F, _ = _factor(ARRAYS, [nonzeros[..., k] for k in _PHI_Q_NONZEROS.places])
         x = _solve(ARRAYS, F, [b[..., k] for k in range(N_EQUATIONS)])
@@ -1950,7 +1948,7 @@ def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
 def _point(t, p, states):
     """Return a kernel's arguments with floats where they are one finite point, else None."""
     if type(t) is not float:
-        if not isinstance(t, (float, int)):
+        if not isinstance(t, (float, int)) or not -1e300 < t < 1e300:
             return None
         t = float(t)
     if p is DEFAULTS:
@@ -2011,14 +2009,34 @@ def _rows(array, shape):
     return array.reshape(math.prod(shape[:-1]), shape[-1]).T
 
 
+def _system(nonzeros, b):
+    """Check the arguments of `solve`: entries of Phi_q (..., nnz) and right sides (..., m)."""
+    nonzeros, b = _checked("nonzeros", nonzeros), _checked("b", b, EQUATIONS)
+    if nonzeros.ndim == 0 or nonzeros.shape[-1] != len(PATTERN):
+        raise InputError(
+            f"{NAME}: nonzeros has shape {nonzeros.shape}, but its last axis must hold the "
+            f"{len(PATTERN)} entries of Phi_q in the order of PATTERN"
+        )
+    try:
+        np.broadcast_shapes(nonzeros.shape[:-1], b.shape[:-1])
+    except ValueError:
+        text = "do not fit each other; they broadcast like NumPy arrays"
+        raise InputError(
+            f"{NAME}: the leading axes of nonzeros {nonzeros.shape} and b {b.shape} {text}"
+        ) from None
+    return nonzeros, b
+
+
 def _checked(name, value, entries=None, axis=-1):
     """Return an argument as a finite array of real numbers, or complex ones for complex steps."""
     if value is DEFAULTS:
         return DEFAULTS
     try:
         array = np.asarray(value)
+        if array.dtype.kind not in "biufcO":
+            raise TypeError
         array = array.astype(complex if array.dtype.kind == "c" else float, copy=False)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{NAME}: {name} is not an array of numbers") from None
     if entries is not None and (array.ndim == 0 or array.shape[axis] != len(entries)):
         raise InputError(

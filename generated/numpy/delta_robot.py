@@ -45,7 +45,7 @@ import numpy as np
 
 NAME = "delta_robot"
 FORMAT = 3
-FINGERPRINT = "b6f8478f90aa9d690f19c04c0dddd2a6"
+FINGERPRINT = "bf459b092f5624a1392425ee80c5dc65"
 N_COORDINATES, N_EQUATIONS = 31, 31
 COORDINATES = (
     "x_platform", "y_platform", "z_platform", "e0_platform", "e1_platform", "e2_platform",
@@ -70,10 +70,10 @@ UNITS = dict(zip(COORDINATES + PARAMETERS, (
 )))
 DEFAULTS = np.array((0.2, 0.25, 0.5, 0.05), dtype=float)
 GUESS = np.array((
-    0.0, 0.05, -0.5, 1.0, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.9486832980505139, 0.0,
-    0.31622776601683794, 0.0, -0.1, 0.17320508075688773, 0.0, 0.47434164902525683,
-    -0.27386127875258304, 0.15811388300841897, 0.8215838362577492, -0.1, -0.17320508075688773,
-    0.0, 0.47434164902525683, 0.27386127875258304, 0.15811388300841897, -0.8215838362577492,
+    0.0, 0.05, -0.5, 1.0, 0.0, 0.0, 0.0, 0.2, 0.0, 0.0, 0.9486832980505138, 0.0,
+    0.3162277660168379, 0.0, -0.1, 0.17320508075688773, 0.0, 0.47434164902525683,
+    -0.27386127875258304, 0.15811388300841897, 0.8215838362577493, -0.1, -0.17320508075688773,
+    0.0, 0.47434164902525683, 0.27386127875258304, 0.15811388300841897, -0.8215838362577493,
     0.6, 0.6, 0.6,
 ), dtype=float)
 # row, column of the entries of Phi_q that are not identically zero
@@ -2610,7 +2610,7 @@ def solve(nonzeros, b):
     nonzeros (..., 151) are the entries of Phi_q in the order of PATTERN, b is (..., 31).
     Where Phi_q is singular, x is not finite or wrong: check Phi_q x = b where that may happen.
     """
-    nonzeros, b = np.asarray(nonzeros, dtype=float), np.asarray(b, dtype=float)
+    nonzeros, b = _system(nonzeros, b)
     with np.errstate(all="ignore"):
         F, _ = _factor(ARRAYS, [nonzeros[..., k] for k in _PHI_Q_NONZEROS.places])
         x = _solve(ARRAYS, F, [b[..., k] for k in range(N_EQUATIONS)])
@@ -2732,7 +2732,7 @@ def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
 def _point(t, p, states):
     """Return a kernel's arguments with floats where they are one finite point, else None."""
     if type(t) is not float:
-        if not isinstance(t, (float, int)):
+        if not isinstance(t, (float, int)) or not -1e300 < t < 1e300:
             return None
         t = float(t)
     if p is DEFAULTS:
@@ -2793,14 +2793,34 @@ def _rows(array, shape):
     return array.reshape(math.prod(shape[:-1]), shape[-1]).T
 
 
+def _system(nonzeros, b):
+    """Check the arguments of `solve`: entries of Phi_q (..., nnz) and right sides (..., m)."""
+    nonzeros, b = _checked("nonzeros", nonzeros), _checked("b", b, EQUATIONS)
+    if nonzeros.ndim == 0 or nonzeros.shape[-1] != len(PATTERN):
+        raise InputError(
+            f"{NAME}: nonzeros has shape {nonzeros.shape}, but its last axis must hold the "
+            f"{len(PATTERN)} entries of Phi_q in the order of PATTERN"
+        )
+    try:
+        np.broadcast_shapes(nonzeros.shape[:-1], b.shape[:-1])
+    except ValueError:
+        text = "do not fit each other; they broadcast like NumPy arrays"
+        raise InputError(
+            f"{NAME}: the leading axes of nonzeros {nonzeros.shape} and b {b.shape} {text}"
+        ) from None
+    return nonzeros, b
+
+
 def _checked(name, value, entries=None, axis=-1):
     """Return an argument as a finite array of real numbers, or complex ones for complex steps."""
     if value is DEFAULTS:
         return DEFAULTS
     try:
         array = np.asarray(value)
+        if array.dtype.kind not in "biufcO":
+            raise TypeError
         array = array.astype(complex if array.dtype.kind == "c" else float, copy=False)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{NAME}: {name} is not an array of numbers") from None
     if entries is not None and (array.ndim == 0 or array.shape[axis] != len(entries)):
         raise InputError(

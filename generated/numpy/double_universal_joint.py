@@ -1493,7 +1493,7 @@ def solve(nonzeros, b):
     nonzeros (..., 107) are the entries of Phi_q in the order of PATTERN, b is (..., 23).
     Where Phi_q is singular, x is not finite or wrong: check Phi_q x = b where that may happen.
     """
-    nonzeros, b = np.asarray(nonzeros, dtype=float), np.asarray(b, dtype=float)
+    nonzeros, b = _system(nonzeros, b)
     with np.errstate(all="ignore"):
         F, _ = _factor(ARRAYS, [nonzeros[..., k] for k in _PHI_Q_NONZEROS.places])
         x = _solve(ARRAYS, F, [b[..., k] for k in range(N_EQUATIONS)])
@@ -1613,7 +1613,7 @@ def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
 def _point(t, p, states):
     """Return a kernel's arguments with floats where they are one finite point, else None."""
     if type(t) is not float:
-        if not isinstance(t, (float, int)):
+        if not isinstance(t, (float, int)) or not -1e300 < t < 1e300:
             return None
         t = float(t)
     if p is DEFAULTS:
@@ -1674,14 +1674,34 @@ def _rows(array, shape):
     return array.reshape(math.prod(shape[:-1]), shape[-1]).T
 
 
+def _system(nonzeros, b):
+    """Check the arguments of `solve`: entries of Phi_q (..., nnz) and right sides (..., m)."""
+    nonzeros, b = _checked("nonzeros", nonzeros), _checked("b", b, EQUATIONS)
+    if nonzeros.ndim == 0 or nonzeros.shape[-1] != len(PATTERN):
+        raise InputError(
+            f"{NAME}: nonzeros has shape {nonzeros.shape}, but its last axis must hold the "
+            f"{len(PATTERN)} entries of Phi_q in the order of PATTERN"
+        )
+    try:
+        np.broadcast_shapes(nonzeros.shape[:-1], b.shape[:-1])
+    except ValueError:
+        text = "do not fit each other; they broadcast like NumPy arrays"
+        raise InputError(
+            f"{NAME}: the leading axes of nonzeros {nonzeros.shape} and b {b.shape} {text}"
+        ) from None
+    return nonzeros, b
+
+
 def _checked(name, value, entries=None, axis=-1):
     """Return an argument as a finite array of real numbers, or complex ones for complex steps."""
     if value is DEFAULTS:
         return DEFAULTS
     try:
         array = np.asarray(value)
+        if array.dtype.kind not in "biufcO":
+            raise TypeError
         array = array.astype(complex if array.dtype.kind == "c" else float, copy=False)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{NAME}: {name} is not an array of numbers") from None
     if entries is not None and (array.ndim == 0 or array.shape[axis] != len(entries)):
         raise InputError(

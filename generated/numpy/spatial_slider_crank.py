@@ -33,7 +33,7 @@ import numpy as np
 
 NAME = "spatial_slider_crank"
 FORMAT = 3
-FINGERPRINT = "c664436b92d4445e4c511680b347d7ea"
+FINGERPRINT = "83dd545ff93308e892d7248ad57b1f4f"
 N_COORDINATES, N_EQUATIONS = 21, 21
 COORDINATES = (
     "x_crank", "y_crank", "z_crank", "e0_crank", "e1_crank", "e2_crank", "e3_crank", "x_rod",
@@ -55,9 +55,8 @@ UNITS = dict(zip(COORDINATES + PARAMETERS + OUTPUTS, (
 )))
 DEFAULTS = np.array((0.08, 0.3, 6.0), dtype=float)
 GUESS = np.array((
-    0.0, 0.1, 0.12, 1.0, 0.0, 0.0, 0.0, 0.1, 0.05, 0.1, 0.8884507093343061,
-    -0.20973476206080321, 0.39732723614588306, -0.09379623704253995, 0.2, 0.0, 0.0, 1.0, 0.0,
-    0.0, 0.0,
+    0.0, 0.1, 0.12, 1.0, 0.0, 0.0, 0.0, 0.1, 0.05, 0.1, 0.888450709334306, -0.20973476206080313,
+    0.397327236145883, -0.09379623704253995, 0.2, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0,
 ), dtype=float)
 # row, column of the entries of Phi_q that are not identically zero
 PATTERN = np.array((
@@ -1102,7 +1101,7 @@ def solve(nonzeros, b):
     nonzeros (..., 97) are the entries of Phi_q in the order of PATTERN, b is (..., 21).
     Where Phi_q is singular, x is not finite or wrong: check Phi_q x = b where that may happen.
     """
-    nonzeros, b = np.asarray(nonzeros, dtype=float), np.asarray(b, dtype=float)
+    nonzeros, b = _system(nonzeros, b)
     with np.errstate(all="ignore"):
         F, _ = _factor(ARRAYS, [nonzeros[..., k] for k in _PHI_Q_NONZEROS.places])
         x = _solve(ARRAYS, F, [b[..., k] for k in range(N_EQUATIONS)])
@@ -1227,7 +1226,7 @@ def _on_batch(kernel, skip, quantities, t, p, states, is_last=False):
 def _point(t, p, states):
     """Return a kernel's arguments with floats where they are one finite point, else None."""
     if type(t) is not float:
-        if not isinstance(t, (float, int)):
+        if not isinstance(t, (float, int)) or not -1e300 < t < 1e300:
             return None
         t = float(t)
     if p is DEFAULTS:
@@ -1288,14 +1287,34 @@ def _rows(array, shape):
     return array.reshape(math.prod(shape[:-1]), shape[-1]).T
 
 
+def _system(nonzeros, b):
+    """Check the arguments of `solve`: entries of Phi_q (..., nnz) and right sides (..., m)."""
+    nonzeros, b = _checked("nonzeros", nonzeros), _checked("b", b, EQUATIONS)
+    if nonzeros.ndim == 0 or nonzeros.shape[-1] != len(PATTERN):
+        raise InputError(
+            f"{NAME}: nonzeros has shape {nonzeros.shape}, but its last axis must hold the "
+            f"{len(PATTERN)} entries of Phi_q in the order of PATTERN"
+        )
+    try:
+        np.broadcast_shapes(nonzeros.shape[:-1], b.shape[:-1])
+    except ValueError:
+        text = "do not fit each other; they broadcast like NumPy arrays"
+        raise InputError(
+            f"{NAME}: the leading axes of nonzeros {nonzeros.shape} and b {b.shape} {text}"
+        ) from None
+    return nonzeros, b
+
+
 def _checked(name, value, entries=None, axis=-1):
     """Return an argument as a finite array of real numbers, or complex ones for complex steps."""
     if value is DEFAULTS:
         return DEFAULTS
     try:
         array = np.asarray(value)
+        if array.dtype.kind not in "biufcO":
+            raise TypeError
         array = array.astype(complex if array.dtype.kind == "c" else float, copy=False)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{NAME}: {name} is not an array of numbers") from None
     if entries is not None and (array.ndim == 0 or array.shape[axis] != len(entries)):
         raise InputError(

@@ -30,10 +30,24 @@ q = [
     1.6  % alpha_contact
 ];
 
-tolerance = 1e-10;  % of the last correction, which is applied
-most_iterations = 25;
+% Scales of the coordinates: 1 rad for angles, the size of the mechanism for lengths. What is small
+% is judged by them, and equations by what their terms contribute at these scales.
+scale = [
+    0.05525289103388786  % x_cam
+    0.05525289103388786  % y_cam
+    1.0  % phi_cam
+    0.05525289103388786  % x_follower
+    0.05525289103388786  % y_follower
+    1.0  % phi_follower
+    1.0  % alpha_contact
+];
 
 T = linspace(0, t_end, points);
+probe = mod((1:7).' * (sqrt(5) - 1) / 2, 1);
+generic = abs(cam_by_table_Phi_q(q + scale .* (1 + probe) / 2, T(1), p)) * scale;
+generic(~isfinite(generic)) = 0;
+limit = 1000000.0 * generic;  % steeper is only what is beside a pole
+limit(generic == 0) = Inf;
 Q = zeros(7, points);
 Q_dot = zeros(7, points);
 Q_ddot = zeros(7, points);
@@ -46,18 +60,19 @@ for k = 1:points
         q = q + h * q_dot + h^2 / 2 * q_ddot;
 
         % position: Phi(q, t) = 0 by Newton's method, from that prediction
-        extent = 1 + norm(q);
-        for iteration = 1:most_iterations
+        allowed = 1e-10 + 3.552713678800501e-15 * max(abs(q) ./ scale);
+        for iteration = 1:25
             correction = cam_by_table_Phi_q(q, t, p) \ cam_by_table_Phi(q, t, p);
             q = q - correction;
-            is_found = norm(correction) <= tolerance * (1 + norm(q));
+            is_found = all(abs(correction) <= allowed * scale);
             if is_found
                 break
             end
         end
         % Where a singular Phi_q sends q far away, the corrections are small beside it, but Phi is not.
-        allowed = 10 * tolerance * extent * sum(abs(cam_by_table_Phi_q(q, t, p)), 2);
-        is_found = is_found && norm(q) < Inf && all(abs(cam_by_table_Phi(q, t, p)) <= allowed);
+        terms = max(generic, min(abs(cam_by_table_Phi_q(q, t, p)) * scale, limit));
+        missing = abs(cam_by_table_Phi(q, t, p));
+        is_found = is_found && all(missing <= 10.0 * allowed * terms);
     end
     if ~is_found
         error('cam_by_table: no position found at t = %g; take more points, or another guess', t);
@@ -67,6 +82,19 @@ for k = 1:points
     Phi_q = cam_by_table_Phi_q(q, t, p);
     q_dot = Phi_q \ cam_by_table_nu(q, t, p);
     q_ddot = Phi_q \ cam_by_table_gamma(q, q_dot, t, p);
+
+    % They are multiplied back: near a singular position all digits may be lost.
+    terms = max(generic, min(abs(Phi_q) * scale, limit));
+    matrix = diag(1 ./ (terms + (terms == 0))) * Phi_q * diag(scale);
+    if ~all(isfinite(matrix(:))) || ~(min(svd(matrix)) * 10000000.0 >= 1)
+        error('cam_by_table: Phi_q is singular at t = %g', t);
+    end
+    missing = abs(Phi_q * [q_dot, q_ddot] - [cam_by_table_nu(q, t, p), cam_by_table_gamma(q, q_dot, t, p)]);
+    speed = max(abs(q_dot) ./ scale);
+    sizes = [speed, max(abs(q_ddot) ./ scale) + speed^2];
+    if ~all(isfinite(sizes)) || ~all(all(missing <= 1e-10 * terms * sizes))
+        error('cam_by_table: velocity and acceleration do not meet the equations at t = %g', t);
+    end
 
     Q(:, k) = q;
     Q_dot(:, k) = q_dot;

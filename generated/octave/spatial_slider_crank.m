@@ -39,9 +39,9 @@ q = [
     0.1  % x_rod
     0.05  % y_rod
     0.1  % z_rod
-    0.8884507093343061  % e0_rod
-    -0.20973476206080321  % e1_rod
-    0.39732723614588306  % e2_rod
+    0.888450709334306  % e0_rod
+    -0.20973476206080313  % e1_rod
+    0.397327236145883  % e2_rod
     -0.09379623704253995  % e3_rod
     0.2  % x_slider
     0.0  % y_slider
@@ -52,10 +52,38 @@ q = [
     0.0  % e3_slider
 ];
 
-tolerance = 1e-10;  % of the last correction, which is applied
-most_iterations = 25;
+% Scales of the coordinates: 1 rad for angles, the size of the mechanism for lengths. What is small
+% is judged by them, and equations by what their terms contribute at these scales.
+scale = [
+    0.27777087688446045  % x_crank
+    0.27777087688446045  % y_crank
+    0.27777087688446045  % z_crank
+    1.0  % e0_crank
+    1.0  % e1_crank
+    1.0  % e2_crank
+    1.0  % e3_crank
+    0.27777087688446045  % x_rod
+    0.27777087688446045  % y_rod
+    0.27777087688446045  % z_rod
+    1.0  % e0_rod
+    1.0  % e1_rod
+    1.0  % e2_rod
+    1.0  % e3_rod
+    0.27777087688446045  % x_slider
+    0.27777087688446045  % y_slider
+    0.27777087688446045  % z_slider
+    1.0  % e0_slider
+    1.0  % e1_slider
+    1.0  % e2_slider
+    1.0  % e3_slider
+];
 
 T = linspace(0, t_end, points);
+probe = mod((1:21).' * (sqrt(5) - 1) / 2, 1);
+generic = abs(spatial_slider_crank_Phi_q(q + scale .* (1 + probe) / 2, T(1), p)) * scale;
+generic(~isfinite(generic)) = 0;
+limit = 1000000.0 * generic;  % steeper is only what is beside a pole
+limit(generic == 0) = Inf;
 Q = zeros(21, points);
 Q_dot = zeros(21, points);
 Q_ddot = zeros(21, points);
@@ -68,18 +96,19 @@ for k = 1:points
         q = q + h * q_dot + h^2 / 2 * q_ddot;
 
         % position: Phi(q, t) = 0 by Newton's method, from that prediction
-        extent = 1 + norm(q);
-        for iteration = 1:most_iterations
+        allowed = 1e-10 + 3.552713678800501e-15 * max(abs(q) ./ scale);
+        for iteration = 1:25
             correction = spatial_slider_crank_Phi_q(q, t, p) \ spatial_slider_crank_Phi(q, t, p);
             q = q - correction;
-            is_found = norm(correction) <= tolerance * (1 + norm(q));
+            is_found = all(abs(correction) <= allowed * scale);
             if is_found
                 break
             end
         end
         % Where a singular Phi_q sends q far away, the corrections are small beside it, but Phi is not.
-        allowed = 10 * tolerance * extent * sum(abs(spatial_slider_crank_Phi_q(q, t, p)), 2);
-        is_found = is_found && norm(q) < Inf && all(abs(spatial_slider_crank_Phi(q, t, p)) <= allowed);
+        terms = max(generic, min(abs(spatial_slider_crank_Phi_q(q, t, p)) * scale, limit));
+        missing = abs(spatial_slider_crank_Phi(q, t, p));
+        is_found = is_found && all(missing <= 10.0 * allowed * terms);
     end
     if ~is_found
         error('spatial_slider_crank: no position found at t = %g; take more points, or another guess', t);
@@ -89,6 +118,19 @@ for k = 1:points
     Phi_q = spatial_slider_crank_Phi_q(q, t, p);
     q_dot = Phi_q \ spatial_slider_crank_nu(q, t, p);
     q_ddot = Phi_q \ spatial_slider_crank_gamma(q, q_dot, t, p);
+
+    % They are multiplied back: near a singular position all digits may be lost.
+    terms = max(generic, min(abs(Phi_q) * scale, limit));
+    matrix = diag(1 ./ (terms + (terms == 0))) * Phi_q * diag(scale);
+    if ~all(isfinite(matrix(:))) || ~(min(svd(matrix)) * 10000000.0 >= 1)
+        error('spatial_slider_crank: Phi_q is singular at t = %g', t);
+    end
+    missing = abs(Phi_q * [q_dot, q_ddot] - [spatial_slider_crank_nu(q, t, p), spatial_slider_crank_gamma(q, q_dot, t, p)]);
+    speed = max(abs(q_dot) ./ scale);
+    sizes = [speed, max(abs(q_ddot) ./ scale) + speed^2];
+    if ~all(isfinite(sizes)) || ~all(all(missing <= 1e-10 * terms * sizes))
+        error('spatial_slider_crank: velocity and acceleration do not meet the equations at t = %g', t);
+    end
 
     Q(:, k) = q;
     Q_dot(:, k) = q_dot;

@@ -9,13 +9,13 @@ import click
 
 import kincompile as kc
 from kincompile.cli.shared import output_option, print_data, read_model, require_output
+from kincompile.emitters.registry import TARGETS
 from kincompile.errors import InputError
 from kincompile.names import listed
-from kincompile.targets.registry import TARGETS
 from kincompile.writing import require_writable
 
 if TYPE_CHECKING:
-    from kincompile.targets.target import Emitted
+    from kincompile.emitters.target import Emitted
 
 ENDINGS = {ending: name for name, item in TARGETS.items() for ending in item.endings}
 """The target whose files have an ending."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
-from functools import partial
 from multiprocessing import get_context
 from typing import Any
 
@@ -33,7 +32,7 @@ from kincompile.names import listed
     "Folder to write: .zarr or .parquet; one that is there is gone on with.", required=False
 )
 @page_option
-@partial(motion_options, has_through=False)
+@motion_options
 @sweep_options
 @click.option(
     "--column", "columns", multiple=True, metavar="NAME", help="Column over time to keep."
@@ -76,10 +75,11 @@ def command(
     goes on where it was. What cannot be solved has a status; where nothing can, the exit code is 3.
     """
     from kincompile.files.sweep_table import SweepTable, read_sweep_table
-    from kincompile.sweep.overview import overview
-    from kincompile.sweep.page import sweep_page
-    from kincompile.sweep.samples import values_of
-    from kincompile.sweep.worker import end_with_parent
+    from kincompile.sweeps.overview import overview
+    from kincompile.sweeps.page import sweep_page
+    from kincompile.sweeps.result import explained
+    from kincompile.sweeps.samples import values_of
+    from kincompile.sweeps.worker import end_with_parent
 
     mechanism = read_model(model)
     table = read_sweep_table(model) or SweepTable({})
@@ -88,10 +88,14 @@ def command(
     if twice := numbers.keys() & swept.keys():
         raise InputError(f"--set names {listed(sorted(twice))}, which is swept: give one of them")
     times = motion.times(mechanism, numbers)
-    kept = {"columns": columns or None, "measures": measures}
+    kept: dict[str, Any] = {"columns": columns or None, "measures": measures}
     if not columns and not measures:
         kept = {"columns": table.columns, "measures": table.measures}
-    options = {"product": product or (table.product and not sweeps), "assembly": motion.assembly}
+    options: dict[str, Any] = {
+        "product": product or (table.product and not sweeps),
+        "assembly": motion.assembly,
+    }
+    options["through"] = motion.through
     # Fresh processes: a copy of this one would have its memory, and its threads as they stand.
     pool = (
         ProcessPoolExecutor(processes, get_context("spawn"), end_with_parent)
@@ -104,6 +108,8 @@ def command(
             target=target, store=output, executor=executor, chunk=chunk, progress=progress,
         )  # fmt: skip
     print_data(f"{found}\n\n{overview(found).table(angle_unit)}\n")
+    for name, what in explained(found.statuses()).items():
+        click.echo(f"{name}: {what}", err=True)
     if output is not None:
         click.echo(f"Wrote {output}", err=True)
     if page is not None:

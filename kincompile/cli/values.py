@@ -16,7 +16,8 @@ import sympy
 import kincompile as kc
 from kincompile.errors import InputError
 from kincompile.files.file_format import MOST_POINTS
-from kincompile.files.safe_expressions import ExpressionError, parse_expression
+from kincompile.files.formula_text import ExpressionError
+from kincompile.files.safe_expressions import parse_expression
 from kincompile.model.bodies import default_values
 from kincompile.model.expressions import (
     degrees_problem,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy
+from scipy.interpolate import BPoly
 from scipy.optimize import brentq
 
 from kincompile.design.columns import Column, column_of
@@ -28,16 +29,20 @@ if TYPE_CHECKING:
 
     from kincompile.design.targets import Target
     from kincompile.model.system import ConstraintSystem
+    from kincompile.runtime.results.solution import Solution
 
     Array = NDArray[np.float64]
     Places = NDArray[np.intp]
     Values = Callable[[Column], Array]
 
+ORDERS = ("", "_dot", "_ddot")
+"""Endings of the names of a column's rates."""
+
 SMALLEST_STEP = 1e-6
 """Time between two points whose times are found, as a part of all time."""
 
 GRID = 73
-"""Times at which the motion as a whole is looked at; the model's own where those are fewer."""
+"""Times at which the motion as a whole is looked at, and between which extremes are found."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,8 +126,6 @@ def read_demands(
         (item, column(item.column, item.title, 2))
         for item in targets
         if isinstance(item, TimeRatio)
-        for item in targets
-        if isinstance(item, TimeRatio)
     )
     limits = []
     for number, item in enumerate(item for item in targets if isinstance(item, Limit)):
@@ -143,13 +146,13 @@ def read_demands(
         raise InputError(problems)
     whole = any(isinstance(item, Moves | TimeRatio) for item in targets)
     whole = whole or any(not is_constant for _, _, is_constant in limits)
-    end, count = float(system.end), min(GRID, system.points)
+    end = float(system.end)
     free = tuple(
         (0.0, end) if target.between is None else target.between
         for target, _ in passing
         if target.times is None
     )
-    grid = np.linspace(0.0, end, max(count, 2)) if whole else np.empty(0)
+    grid = np.linspace(0.0, end, GRID) if whole else np.empty(0)
     return Demands(passing, free, tuple(limits), ratios, grid)
 
 
@@ -172,16 +175,65 @@ def deviation(wanted: Array, column: Column, got: Array) -> Array:
     return off
 
 
-def limit_gaps(item: Limit, got: Array) -> list[tuple[Array, float]]:
-    """Return what is left to each limit that there is, and the factor of its derivative."""
-    size = max((abs(end) for end in (item.least, item.most) if math.isfinite(end)), default=0.0)
-    size = size or 1.0
-    found = []
-    if math.isfinite(item.least):
-        found.append(((got - item.least) / size, 1 / size))
-    if math.isfinite(item.most):
-        found.append(((item.most - got) / size, -1 / size))
-    return found
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One end of a limit."""
+
+    sign: float  # 1 of the least value that is allowed, -1 of the greatest
+    bound: float
+    factor: float  # of the derivative of what is left
+
+    def left(self, got: Array) -> Array:
+        """Return what is left to it as a part of the limit's size, negative beyond it."""
+        return self.factor * (got - self.bound)
+
+
+def sides(item: Limit) -> list[Side]:
+    """Return the ends that a limit has."""
+    ends = [
+        (sign, end) for sign, end in ((1.0, item.least), (-1.0, item.most)) if math.isfinite(end)
+    ]
+    size = max(abs(end) for _, end in ends) or 1.0
+    return [Side(sign, end, sign / size) for sign, end in ends]
+
+
+class Extremes:
+    """The least (sign 1) or greatest (sign -1) values between neighbouring times of a grid.
+
+    Of a column and as many of its rates as are known, shape (orders, N), these are at one of both
+    times, or where the first rate changes sign between them.
+    """
+
+    def __init__(self, t: Array, orders: Array, sign: float) -> None:
+        value = sign * orders[0]
+        lower = np.arange(t.size - 1) + (value[1:] < value[:-1])
+        self._t, self._ends = t, lower if t.size > 1 else np.zeros(1, dtype=np.intp)
+        self._inner: dict[int, float] = {}
+        if len(orders) > 1:
+            slope = sign * orders[1]
+            for cell in np.flatnonzero((slope[:-1] < 0) & (slope[1:] > 0)).tolist():
+                rate = self._between(orders, cell).derivative()
+                self._inner[cell] = brentq(rate, t[cell], t[cell + 1], xtol=1e-16)
+
+    def of(self, orders: Array) -> Array:
+        """Return a column there, or derivatives of it (orders, N, k) by parameters, (N - 1, ...).
+
+        The time of an extreme changes with the parameters, but to first order not the value.
+        """
+        found: Array = orders[0][self._ends]
+        for cell, t in self._inner.items():
+            found[cell] = self._between(orders, cell)(t)
+        return found
+
+    def _between(self, orders: Array, cell: int) -> Any:
+        """Return the polynomial through values and rates at both ends of a cell."""
+        ends = orders[:, cell : cell + 2].swapaxes(0, 1)
+        return BPoly.from_derivatives(self._t[cell : cell + 2], ends)
+
+
+def orders_of(motion: Solution, column: Column) -> Array:
+    """Return a column and its rates over time, (3 - order, N)."""
+    return np.array([motion[column.of + suffix] for suffix in ORDERS[column.order :]])
 
 
 @dataclass(frozen=True, slots=True)

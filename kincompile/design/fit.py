@@ -30,7 +30,7 @@ from kincompile.design.targets import Limit, Moves, Passing, TimeRatio
 from kincompile.design.trial import EAGERNESS, Trial, Workbench
 from kincompile.design.variation import require_mechanism
 from kincompile.errors import InputError, KincompileWarning, UnsupportedError
-from kincompile.files.file_format import MINIMIZERS, SEARCHES
+from kincompile.files.file_format import MINIMIZERS, MOST_SEARCHED, MOST_STARTS, SEARCHES
 from kincompile.model.outputs import Output
 from kincompile.names import listed, suggestion
 from kincompile.runtime.engine.code import code_of
@@ -141,8 +141,7 @@ def fit(
     counts = Counts(
         finder.tried, len(chosen), bench.motions, bench.gradients, time.perf_counter() - begun
     )
-    errors = sorted(end.error for end in ends)
-    return fitted(model, demands, best, names, counts, errors, EXCESS)
+    return fitted(model, demands, best, names, counts, ends, EXCESS)
 
 
 def _rank(trial: Trial) -> tuple[bool, float]:
@@ -233,7 +232,10 @@ def _check_options(samples: Any, starts: Any, search: str, minimizer: str) -> No
     """Check what says how to search."""
     problems = [
         f"{name} is {value!r}: give a whole number from 1 to {most:,}"
-        for name, value, most in (("samples", samples, 2**20), ("starts", starts, 10_000))
+        for name, value, most in (
+            ("samples", samples, MOST_SEARCHED),
+            ("starts", starts, MOST_STARTS),
+        )
         if not (isinstance(value, int | np.integer) and 1 <= value <= most)
     ]
     problems += [

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.compiler import compile as compile_model
-from kincompile.design.demands import deviation, limit_gaps
+from kincompile.design.demands import Extremes, deviation, orders_of, sides
 from kincompile.design.variation import with_values
 from kincompile.errors import KincompileWarning
 from kincompile.html import Shown, table_html
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from kincompile.runtime.results.solution import Solution
 
     Array = NDArray[np.float64]
+
+FINELY = 4
+"""Parts of each step of the grid at which limits are judged in the end."""
 
 REACHED = ("target", "t", "wanted", "got", "off")
 KEPT = ("limit", "from", "to", "least", "greatest")
@@ -100,7 +103,9 @@ class Fit(Shown):
     error : float
         The sum of squares of the weighted deviations.
     errors : tuple of float
-        That of every start that was followed, the least first.
+        That of every start whose end keeps the limits, the least first.
+    outside : tuple of float
+        That of every other start, the least first.
     reached : tuple of Reached
         Every wanted value.
     limits : tuple of Kept
@@ -121,6 +126,7 @@ class Fit(Shown):
     units: dict[str, str]
     error: float
     errors: tuple[float, ...]
+    outside: tuple[float, ...]
     reached: tuple[Reached, ...]
     limits: tuple[Kept, ...]
     motion: Solution
@@ -193,7 +199,8 @@ class Fit(Shown):
     def effort(self) -> str:
         """Return what it took, in a sentence."""
         counts = self.counts
-        ends = sum(error <= 1.01 * self.errors[0] + 1e-30 for error in self.errors)
+        errors = self.errors or self.outside
+        ends = sum(error <= 1.01 * errors[0] + 1e-30 for error in errors)
         return (
             f"Sum of squares {self.error:.6g}, from {counted(ends, 'start')} of {counts.starts}; "
             f"{counts.sampled} sets searched, {counted(counts.motions, 'motion')} and "
@@ -230,10 +237,10 @@ def fitted(
     best: Trial,
     names: Sequence[str],
     counts: Counts,
-    errors: Sequence[float],
+    ends: Sequence[Trial],
     allowed: float,
 ) -> Fit:
-    """Return the result of a fit from its best trial."""
+    """Return the result of a fit from its best trial, and the ends of all its starts."""
     values = dict(zip(names, best.x.tolist(), strict=False))
     before = {item.name: item.default for item in model.system().parameters}
     changed = _on_branch(model, values, best.motion)
@@ -243,7 +250,8 @@ def fitted(
         {name: float(before[name] or 0.0) for name in names},
         {item.name: item.unit for item in model.parameters},
         best.error,
-        tuple(errors),
+        tuple(sorted(end.error for end in ends if end.excess <= allowed)),
+        tuple(sorted(end.error for end in ends if end.excess > allowed)),
         tuple(_reached(demands, best, len(names))),
         tuple(_kept(demands, best, allowed)),
         best.motion,
@@ -303,11 +311,26 @@ def _reached(demands: Demands, best: Trial, count: int) -> list[Reached]:
 
 def _kept(demands: Demands, best: Trial, allowed: float) -> list[Kept]:
     """Return every limit with what is along the motion."""
-    rows = []
-    on_grid = np.searchsorted(best.motion.t, demands.grid)
+    if not demands.limits:
+        return []
+    motion, rows = _finely(best.motion, demands.grid), []
     for item, column, is_constant in demands.limits:
-        values = best.motion[column.name][np.zeros(1, np.intp) if is_constant else on_grid]
-        holds = all((gap >= -allowed).all() for gap, _ in limit_gaps(item, values))
-        least, greatest = float(values.min()), float(values.max())
+        places = slice(0, 1) if is_constant else slice(None)
+        orders = orders_of(motion, column)[:, places]
+        low, high = (Extremes(motion.t[places], orders, sign).of(orders) for sign in (1.0, -1.0))
+        ends = np.array([low.min(), high.max()])
+        holds = all((side.left(ends) >= -allowed).all() for side in sides(item))
+        least, greatest = ends.tolist()
         rows.append(Kept(item.title, item.least, item.most, least, greatest, holds))
     return rows
+
+
+def _finely(motion: Solution, grid: Array) -> Solution:
+    """Return a motion at the times of a grid and between them, as limits are judged."""
+    if not grid.size or motion.module is None:  # limits of dimensions alone
+        return motion
+    t = np.linspace(grid[0], grid[-1], FINELY * (grid.size - 1) + 1)
+    start = int(np.searchsorted(motion.t, grid[0]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", KincompileWarning)
+        return solve(motion.module, t, motion.parameters, motion.q[start])

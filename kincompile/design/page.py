@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.derivation.document import Chapter, Manuscript, table, text
-from kincompile.derivation.to_html import as_html
+from kincompile.derivations.document import Chapter, Manuscript, table, text
+from kincompile.derivations.to_html import as_html
 from kincompile.design.fitted import DIMENSIONS, KEPT, REACHED
 from kincompile.design.tolerance_analysis import TITLES
 from kincompile.html import framed_html

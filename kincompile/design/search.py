@@ -17,7 +17,7 @@ from scipy import optimize
 from scipy.stats import qmc
 
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
-from kincompile.design.demands import deviation, limit_gaps
+from kincompile.design.demands import deviation, sides
 from kincompile.design.trial import EAGERNESS
 from kincompile.errors import KincompileWarning
 from kincompile.runtime.engine.code import code_of
@@ -229,7 +229,8 @@ class Search:
         on_grid = np.searchsorted(self._times, self.demands.grid)
         for item, column, is_constant in self.demands.limits:
             places = slice(0, 1) if is_constant else on_grid
-            for gap, _ in limit_gaps(item, seen[column.of, column.order][:, places]):
+            for side in sides(item):
+                gap = side.left(seen[column.of, column.order][:, places])
                 total += EAGERNESS**2 * (np.minimum(gap, 0.0) ** 2).sum(axis=1)
         for ratio, column in self.demands.ratios:
             y = seen[column.of, column.order][:, on_grid]

@@ -27,8 +27,9 @@ from kincompile.errors import InputError
 from kincompile.files.content import file_content
 from kincompile.files.data_text import listed_problems, read_json, read_toml
 from kincompile.files.file_fields import FieldReader
-from kincompile.files.file_format import FIELDS, MOST_VARIANTS, TARGETS
-from kincompile.names import column_name, listed, name_problem, shown
+from kincompile.files.file_format import FIELDS, TARGETS
+from kincompile.model.expressions import as_sympy
+from kincompile.names import column_name, listed, name_problem
 
 if TYPE_CHECKING:
     import os
@@ -40,7 +41,8 @@ if TYPE_CHECKING:
 
     Arguments = dict[str, Any]
 
-MOST_SEED = 2**32 - 1
+OPTIONS = ("samples", "starts", "search", "minimizer", "seed")
+"""Fields of a fit that are arguments of `kc.fit` as they are."""
 
 
 def read_tolerance(path: str | os.PathLike[str]) -> Arguments:
@@ -64,10 +66,11 @@ def _reader(path: str | os.PathLike[str], section: str) -> _TaskReader:
             f"{file} has no table [{section}]: give a model as .toml or .json, with that table"
         )
     reader = _TaskReader(read(file, file_content(file)), section)
-    if not isinstance(reader.row, dict):
-        raise InputError(
-            f"{file} has no table [{section}]: docs/model_files.md says what stands in one"
-        )
+    if reader.row is None:
+        fields = listed(FIELDS[section], 20)
+        raise InputError(f"{file} has no table [{section}]. Add one; its fields are: {fields}.")
+    reader.fits(reader.row, FIELDS["model"][section].schema, (section,))
+    reader.checked({})
     return reader
 
 
@@ -89,19 +92,18 @@ class _TaskReader(FieldReader):
     def tolerance(self) -> Arguments:
         """Return the arguments of `kc.tolerance`."""
         row = self.row
-        self.has_fields(("tolerance",), row, FIELDS["tolerance"])
-        limits = self._named("parameters")
-        loose = self._named("clearances")
         found: Arguments = {
-            "tolerances": {name: self._deviation(name, value) for name, value in limits.items()},
+            "tolerances": {
+                name: self._deviation(name, value)
+                for name, value in row.get("parameters", {}).items()
+            },
             "clearances": {
                 name: self.finite(value, ("tolerance", "clearances", name))
-                for name, value in loose.items()
+                for name, value in row.get("clearances", {}).items()
             },
-            "of": self.texts(row.get("of"), ("tolerance", "of")),
+            "of": tuple(row["of"]) if "of" in row else None,
         }
-        samples = self.count(row.get("samples"), ("tolerance", "samples"), MOST_VARIANTS, 0)
-        return found | {"samples": samples or 0} | self._seed()
+        return found | {key: row[key] for key in ("samples", "seed") if key in row}
 
     def _deviation(self, name: str, given: Any) -> Any:
         """Return the tolerance of a parameter."""
@@ -110,8 +112,6 @@ class _TaskReader(FieldReader):
             return tuple(self.finite(item, (*address, k)) for k, item in enumerate(given))
         if not isinstance(given, dict):
             return self.finite(given, address)
-        if not self.has_fields(address, given, FIELDS["deviation"]):
-            return 1.0
         numbers = {
             key: self.finite(given[key], (*address, key))
             for key in ("low", "high", "sigmas")
@@ -127,40 +127,20 @@ class _TaskReader(FieldReader):
     def fit(self, model: Mechanism) -> Arguments:
         """Return the arguments of `kc.fit`."""
         row = self.row
-        if not self.has_fields(("fit",), row, FIELDS["fit"]):
-            return {}
         bounds = {
             name: tuple(self._numbers(value, ("fit", "parameters", name)))
-            for name, value in self._named("parameters").items()
+            for name, value in row["parameters"].items()
         }
-        given = row["targets"]
-        if not isinstance(given, list):
-            self.problem(("fit", "targets"), f"expected a list of tables, not {shown(given)}")
-            given = []
-        names = _symbols(model)
-        read = [self._target(item, ("fit", "targets", k), names) for k, item in enumerate(given)]
+        names, rows = _symbols(model), row["targets"]
+        read = [self._target(item, ("fit", "targets", k), names) for k, item in enumerate(rows)]
         found: Arguments = {"targets": [item for item in read if item], "bounds": bounds}
-        for key in ("samples", "starts"):
-            if (count := self.count(row.get(key), ("fit", key), MOST_VARIANTS)) is not None:
-                found[key] = count
-        return (
-            found | {key: row[key] for key in ("search", "minimizer") if key in row} | self._seed()
-        )
+        return found | {key: row[key] for key in OPTIONS if key in row}
 
     def _target(self, row: Any, address: Address, names: Mapping[str, sympy.Expr]) -> Target | None:
         """Return a target."""
-        kinds = [kind for kind in TARGETS if isinstance(row, dict) and kind in row]
-        if len(kinds) != 1:
-            self.problem(address, f"expected one target: {listed(TARGETS)}, not {shown(row)}")
-            return None
-        (kind,) = kinds
-        if not self.has_fields(address, row, TARGETS[kind]):
-            return None
+        (kind,) = (kind for kind in TARGETS if kind in row)
         if kind == "moves":
             return targets.moves()
-        if not isinstance(row[kind], str):
-            self.problem((*address, kind), f"expected a name in quotes, not {shown(row[kind])}")
-            return None
         options = {
             key: self._option(key, value, (*address, key))
             for key, value in row.items()
@@ -181,11 +161,8 @@ class _TaskReader(FieldReader):
     def _option(self, key: str, value: Any, address: Address) -> Any:
         """Return the value of a field of a target."""
         if key == "title":
-            return str(value)
+            return value
         if key in ("points", "poses"):
-            if not isinstance(value, list):
-                self.problem(address, f"expected a list of lists of numbers, not {shown(value)}")
-                return []
             return [self._numbers(item, (*address, k)) for k, item in enumerate(value)]
         if key in ("times", "values", "between"):
             return self._numbers(value, address)
@@ -199,29 +176,14 @@ class _TaskReader(FieldReader):
         if is_name and (text not in names or column_name(text) != text):
             return text
         known = len(self.problems)
-        found = self.expression(text, address, names)
-        if len(self.problems) == known and not isinstance(found, sympy.Expr):
+        found = as_sympy(self.expression(text, address, names))
+        if len(self.problems) == known and not found.free_symbols:
             self.problem(address, "expected a column or a formula of parameters, not a number")
         return found
 
     def _numbers(self, value: Any, address: Address) -> list[float]:
         """Return a list of numbers, which may be formulas without names."""
-        if not isinstance(value, list):
-            self.problem(address, f"expected a list of numbers, not {shown(value)}")
-            return []
         return [self.finite(item, (*address, k)) for k, item in enumerate(value)]
-
-    def _named(self, key: str) -> dict[str, Any]:
-        """Return a table of names and values, empty where there is none."""
-        given = self.row.get(key, {})
-        if isinstance(given, dict):
-            return given
-        self.problem((self.section, key), f"expected names and values, not {shown(given)}")
-        return {}
-
-    def _seed(self) -> Arguments:
-        seed = self.count(self.row.get("seed"), (self.section, "seed"), MOST_SEED, 0)
-        return {} if seed is None else {"seed": seed}
 
 
 def _symbols(model: Mechanism) -> dict[str, sympy.Expr]:

@@ -25,6 +25,7 @@ from kincompile.design.deviation import read_clearance, read_deviation
 from kincompile.design.tolerance_analysis import Drawn, ToleranceAnalysis
 from kincompile.design.variation import clearance_names, require_mechanism, with_clearances
 from kincompile.errors import InputError
+from kincompile.files.file_format import MOST_SAMPLES
 from kincompile.names import listed, suggestion
 from kincompile.runtime.inputs import mapping_of, require_seed
 from kincompile.runtime.results.sensitivities import sensitivities
@@ -46,9 +47,6 @@ if TYPE_CHECKING:
 
 MOST_NUMBERS = 20_000_000
 """Numbers of the motions that are sampled at a time, so that they fit into memory."""
-
-MOST_SAMPLES = 2**24
-"""Samples at most."""
 
 STILL = 1e-13
 """Effect, relative to the largest value of its column, that is a rounding error."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
-from kincompile.design.demands import deviation, limit_gaps, turning
+from kincompile.design.demands import ORDERS, Extremes, deviation, orders_of, sides, turning
 from kincompile.errors import KincompileWarning
 from kincompile.runtime.follow import follow
 from kincompile.runtime.inputs import read_inputs
@@ -125,10 +125,10 @@ class Workbench:
                 off = deviation(target.values[:, k], column, motion[column.name][places])
                 by_p = by_t = off[:, np.newaxis][:, :0]
                 if found is not None:
-                    by_p = weight * self._by_parameters(found, column)[places]
+                    by_p = weight * self._by_parameters(found, column)[0, places]
                     by_t = np.zeros((at.size, len(self.demands.time_bounds())))
                 if found is not None and is_free:
-                    rates = weight * _rate(motion, column)[places]
+                    rates = weight * orders_of(motion, column)[1, places]
                     by_t[:, first : first + at.size] = np.tril(
                         np.repeat(rates[:, None], at.size, 1)
                     )
@@ -138,7 +138,9 @@ class Workbench:
             yield self._ratio(motion, ratio, column, found)
 
     def _by_parameters(self, found: Sensitivities, column: Column) -> Array:
-        return np.stack([found[column.name, name] for name in self.names], axis=-1)
+        """Return the derivatives of a column and its rates, (3 - order, N, parameters)."""
+        names = [column.of + suffix for suffix in ORDERS[column.order :]]
+        return np.array([[found[x, name] for name in self.names] for x in names]).swapaxes(1, 2)
 
     def _ratio(
         self, motion: Solution, target: Any, column: Column, found: Sensitivities | None
@@ -146,7 +148,7 @@ class Workbench:
         """Return the deviation of a time ratio, and its derivatives."""
         grid = self.demands.grid
         on_grid = np.searchsorted(motion.t, grid)
-        y, rate, second = (_order(motion, column, order)[on_grid] for order in (0, 1, 2))
+        y, rate, second = orders_of(motion, column)[:, on_grid]
         ends = []
         for sign in (1.0, -1.0):
             zeros = turning(grid, rate, second, sign)
@@ -161,7 +163,7 @@ class Workbench:
         ratio = rise / (whole - rise)
         by_p = np.zeros((1, len(self.names)))
         if found is not None:
-            slopes = [item[on_grid] for item in self._rates_by_parameters(found, column)]
+            slopes = self._by_parameters(found, column)[1:, on_grid]
             by_rise = whole / (whole - rise) ** 2
             for item, sign in ((top, 1.0), (bottom, -1.0)):
                 cell = slice(item.cell, item.cell + 2)
@@ -169,12 +171,6 @@ class Workbench:
                 by_p += sign * by_rise * (item.weights @ values)
         by_t = np.zeros((1, len(self.demands.time_bounds())))
         return target.weight * np.array([ratio - target.ratio]), target.weight * by_p, by_t
-
-    def _rates_by_parameters(self, found: Sensitivities, column: Column) -> list[Array]:
-        return [
-            np.stack([found[f"{column.of}_{rate}", name] for name in self.names], axis=-1)
-            for rate in ("dot", "ddot")
-        ]
 
     def _gap_rows(
         self, motion: Solution, instants: list[Array], found: Sensitivities | None
@@ -184,11 +180,16 @@ class Workbench:
         times = len(self.demands.time_bounds())
         for item, column, is_constant in self.demands.limits:
             places = np.zeros(1, dtype=np.intp) if is_constant else on_grid
-            for gap, factor in limit_gaps(item, motion[column.name][places]):
-                by_p = np.zeros((gap.size, 0))
-                if found is not None:
-                    by_p = factor * self._by_parameters(found, column)[places]
-                yield gap, by_p, np.zeros((gap.size, times if found is not None else 0))
+            orders, by_p = orders_of(motion, column)[:, places], None
+            if found is not None:
+                by_p = self._by_parameters(found, column)[:, places]
+            for side in sides(item):
+                extremes = Extremes(motion.t[places], orders, side.sign)
+                gap = side.left(extremes.of(orders))
+                if by_p is None:
+                    yield gap, np.zeros((gap.size, 0)), np.zeros((gap.size, 0))
+                else:
+                    yield gap, side.factor * extremes.of(by_p), np.zeros((gap.size, times))
         first = 0
         for (begin, end), (target, _) in zip(self.demands.free, self.demands.untimed, strict=True):
             count = len(target.values)
@@ -202,13 +203,3 @@ class Workbench:
             first += count
             gap = np.array([(end - at[-1]) / (end - begin) + SLACK])
             yield gap, np.zeros((1, len(self.names))), by_t
-
-
-def _order(motion: Solution, column: Column, order: int) -> Array:
-    """Return a coordinate or an output, or a rate of it, over time."""
-    return motion[column.of + ("", "_dot", "_ddot")[order]]
-
-
-def _rate(motion: Solution, column: Column) -> Array:
-    """Return the time derivative of a column, over time."""
-    return _order(motion, column, column.order + 1)

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kincompile.derivation.to_html import as_html
+from kincompile.derivations.to_html import as_html
 from kincompile.errors import InputError
 from kincompile.exercises.blanks import Blank, choose_blanks
 from kincompile.exercises.sheet import sheet, solutions

@@ -4,35 +4,45 @@ from __future__ import annotations
 
 import csv
 import json
+import math
+import os
 import re
+import time
+import traceback
+import warnings
 from dataclasses import dataclass, fields
+from functools import partial
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from kincompile.compare.compare import compare
-from kincompile.compare.reference import Reference
-from kincompile.errors import InputError, KincompileError
+from kincompile.checker.compare import compare
+from kincompile.checker.reference import Reference
+from kincompile.errors import InputError, InternalError, KincompileError
 from kincompile.exercises.blanks import Blank
 from kincompile.exercises.kit import BLANKS, FORMAT, HAND_IN, INSTRUCTOR, MODELS, STUDENTS
+from kincompile.files.content import decoded, file_content
 from kincompile.files.files import read
+from kincompile.names import escaped
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
-    import os
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
-    from kincompile.compare.comparison import ComparedEntry
+    from kincompile.checker.comparison import ComparedEntry
     from kincompile.model.system import ConstraintSystem
 
 MOST_BYTES = 100_000
 """Size of a hand-in file above which it is not read."""
 
+SECONDS, MOST_MEMORY = 60, 2_000_000_000
+"""Processor time and bytes that marking one student may take."""
+
 MOST_CHARACTERS = 300
 """Characters of a reason."""
 
 _COMMENT = re.compile(r"[#%].*")
-_LINE = re.compile(r"\s*(B\d+)\b\s*(=?)\s*(.*?)[\s;]*", re.IGNORECASE)
+_LINE = re.compile(r"\s*(B\d+)\b\s*(=?)\s*(.*)", re.IGNORECASE)
 _PLACE = re.compile(r"\w+, row \d+, column \d+: (line 1, )?")
 """Where a formula stands in a matrix, which no student has seen."""
 
@@ -84,12 +94,17 @@ class Marks:
             points = [item.points for item in marks]
             lost = (item for item in marks if item.reason != RIGHT)
             reasons = "; ".join(f"{item.blank.name}: {item.reason}" for item in lost)
-            table.writerow([student, sum(points), len(points), *points, reasons])
+            table.writerow([_cell(student), sum(points), len(points), *points, _cell(reasons)])
         return rows.getvalue()
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the table to a file, in one step."""
         return write_atomically(path, self.to_csv())
+
+
+def _cell(text: str) -> str:
+    """Return a text that no spreadsheet takes for a formula."""
+    return f"'{text}" if text.startswith(("=", "+", "-", "@")) else text
 
 
 def mark(folder: str | os.PathLike[str]) -> Marks:
@@ -107,12 +122,103 @@ def mark(folder: str | os.PathLike[str]) -> Marks:
     blanks, students = _key(target)
     found: dict[str, tuple[Mark, ...]] = {}
     for student in students:
-        model = read(target / INSTRUCTOR / MODELS / f"{student}.toml").system()
         lines, problem = _lines(target / STUDENTS / student / HAND_IN)
         answers, unread = _answers(lines)
-        empty = {item: Mark(item, 0, problem or unread.get(item.name, EMPTY)) for item in blanks}
-        found[student] = tuple((empty | _marked(Reference(model), blanks, answers)).values())
+        marks = {item: Mark(item, 0, problem or unread.get(item.name, EMPTY)) for item in blanks}
+        if answers:
+            path = target / INSTRUCTOR / MODELS / f"{student}.toml"
+            marks |= within_budget(partial(_student, path, blanks, answers), blanks)
+        found[student] = tuple(marks.values())
     return Marks(target, found)
+
+
+def _student(path: Path, blanks: Sequence[Blank], answers: Mapping[str, str]) -> dict[Blank, Mark]:
+    return _marked(Reference(read(path).system()), blanks, answers)
+
+
+def within_budget(
+    work: Callable[[], dict[Blank, Mark]], blanks: Sequence[Blank]
+) -> dict[Blank, Mark]:
+    """Return what marks a student, done by a process of its own with a budget of time and memory.
+
+    Where there are no such processes, as on Windows, it is done here, without a budget.
+
+    Raises
+    ------
+    InputError
+        If the model of the student cannot be read.
+    InternalError
+        If marking ends by a mistake of this program; a note has the traceback.
+    """
+    ended, found = _in_a_process(work) if hasattr(os, "fork") else _outcome(work)
+    if ended == "marked":
+        by_name = {item.name: item for item in blanks}
+        return {by_name[name]: Mark(by_name[name], *rest) for name, *rest in found}
+    if ended == "refused":
+        raise InputError(found)
+    if ended == "broken":
+        text, trace = found
+        bug = InternalError(f"marking ended by {text}.")
+        bug.add_note(trace)
+        raise bug
+    return {item: Mark(item, 0, f"stopped: {found}") for item in blanks}
+
+
+def _in_a_process(work: Callable[[], dict[Blank, Mark]]) -> Any:
+    """Return the outcome of a student's work in a process that ends at its budget."""
+    its, told = os.pipe()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # the child starts no thread
+        child = os.fork()
+    if not child:
+        _work_and_tell(work, told)
+    os.close(told)
+    with os.fdopen(its, "rb") as stream:
+        answer = stream.read()
+    os.waitpid(child, 0)
+    if answer:
+        return json.loads(answer)
+    took = f"marking it took more than {SECONDS} s or {MOST_MEMORY // 10**9} GB"
+    return "stopped", f"{took}; write shorter formulas"
+
+
+def _work_and_tell(work: Callable[[], dict[Blank, Mark]], told: int) -> NoReturn:
+    """Do a student's work in the child process, and end it whatever happens."""
+    import resource
+
+    try:
+        used = math.ceil(time.process_time())
+        resource.setrlimit(resource.RLIMIT_CPU, (used + SECONDS, used + SECONDS + 1))
+        resource.setrlimit(resource.RLIMIT_AS, (_memory() + MOST_MEMORY,) * 2)
+        answer = json.dumps(_outcome(work)).encode()
+        with os.fdopen(told, "wb") as stream:
+            stream.write(answer)
+    finally:
+        os._exit(0)
+
+
+def _outcome(work: Callable[[], dict[Blank, Mark]]) -> tuple[str, Any]:
+    """Return how a student's work ended, in a word, and its marks or what is wrong."""
+    try:
+        rows = [(item.blank.name, item.points, item.reason) for item in work().values()]
+    except MemoryError:
+        raise
+    except RecursionError:
+        return "stopped", "a formula is nested too deeply; write shorter formulas"
+    except KincompileError as error:
+        return "refused", str(error)
+    except Exception as error:
+        return "broken", (f"{type(error).__name__}: {error}", traceback.format_exc())
+    return "marked", rows
+
+
+def _memory() -> int:
+    """Return the address space of this process in bytes, 0 where the system does not say."""
+    try:
+        pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[0]
+    except OSError:
+        return 0
+    return int(pages) * os.sysconf("SC_PAGE_SIZE")
 
 
 def _key(folder: Path) -> tuple[list[Blank], list[str]]:
@@ -144,17 +250,13 @@ def _key(folder: Path) -> tuple[list[Blank], list[str]]:
 
 def _lines(path: Path) -> tuple[list[str], str]:
     """Return the lines of a hand-in file, and what is wrong with the whole file."""
+    if not os.path.lexists(path):
+        return [], "nothing handed in"
     try:
-        if not path.is_file():
-            return [], "nothing handed in"
-        content = path.read_bytes()[: MOST_BYTES + 1]
-        if len(content) > MOST_BYTES:
-            return [], f"the file has more than {MOST_BYTES} bytes"
-        return content.decode("utf-8-sig").splitlines(), ""
-    except OSError as error:
-        return [], f"the file cannot be read: {error.strerror}"
-    except UnicodeDecodeError:
-        return [], "the file is not a text in UTF-8"
+        content = file_content(path, MOST_BYTES, follows_links=False)
+        return decoded(path, content).splitlines(), ""
+    except KincompileError as error:
+        return [], _short(str(error).replace(str(path), path.name))
 
 
 def _answers(lines: Sequence[str]) -> tuple[dict[str, str], dict[str, str]]:
@@ -162,7 +264,7 @@ def _answers(lines: Sequence[str]) -> tuple[dict[str, str], dict[str, str]]:
     answers: dict[str, str] = {}
     unread: dict[str, str] = {}
     for line in lines:
-        if (found := _LINE.fullmatch(_COMMENT.sub("", line))) is None:
+        if (found := _LINE.fullmatch(_COMMENT.sub("", line).rstrip("; \t"))) is None:
             continue
         name, equals, formula = found[1].upper(), found[2], found[3]
         if not equals:
@@ -237,5 +339,5 @@ def _rows(system: ConstraintSystem, constraint: str) -> tuple[int, int]:
 
 
 def _short(text: str) -> str:
-    line = " ".join(text.split())
+    line = escaped(" ".join(text.split()))
     return line if len(line) <= MOST_CHARACTERS else f"{line[: MOST_CHARACTERS - 3]}..."

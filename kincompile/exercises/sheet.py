@@ -8,9 +8,9 @@ import sympy
 
 from kincompile.calculus.expressions import Symbol, VectorSymbol
 from kincompile.calculus.space import EulerRotation
-from kincompile.derivation.assembled import EULER_PARAMETERS
-from kincompile.derivation.derivation import constraint_chapters
-from kincompile.derivation.document import (
+from kincompile.derivations.assembled import EULER_PARAMETERS
+from kincompile.derivations.derivation import constraint_chapters
+from kincompile.derivations.document import (
     Chapter,
     Display,
     Figure,
@@ -20,9 +20,9 @@ from kincompile.derivation.document import (
     table,
     text,
 )
-from kincompile.derivation.evaluation import evaluation
-from kincompile.derivation.figures import Figures
-from kincompile.derivation.formulas import (
+from kincompile.derivations.evaluation import evaluation
+from kincompile.derivations.figures import Figures
+from kincompile.derivations.formulas import (
     VELOCITY_TERM,
     Call,
     DerivativeSymbol,
@@ -37,8 +37,8 @@ from kincompile.names import rate
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from kincompile.derivation.document import Block, Run, Runs
-    from kincompile.derivation.formulas import Formula
+    from kincompile.derivations.document import Block, Run, Runs
+    from kincompile.derivations.formulas import Formula
     from kincompile.exercises.blanks import Blank
     from kincompile.model.system import ConstraintSystem
 

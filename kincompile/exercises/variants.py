@@ -12,7 +12,12 @@ import numpy as np
 import sympy
 
 from kincompile.compiler import compile as compile_model
-from kincompile.errors import InputError, KincompileError, UnsupportedError
+from kincompile.errors import (
+    InputError,
+    KincompileError,
+    RedundantConstraintWarning,
+    UnsupportedError,
+)
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND
 from kincompile.model.constraint import Constraint
@@ -65,6 +70,7 @@ def variants(mechanism: Mechanism, count: int, seed: int, choices: Choices) -> l
 
     Their parameters are numbers, so that formulas by hand are written with these.
     """
+    _require_generic(mechanism)
     found: dict[_Change, Mechanism] = {}
     for student in range(1, count + 1):
         random = Random(f"{seed}-{student}")
@@ -80,6 +86,19 @@ def variants(mechanism: Mechanism, count: int, seed: int, choices: Choices) -> l
                 "students, or give the model parameters that can vary by a quarter"
             )
     return list(found.values())
+
+
+def _require_generic(mechanism: Mechanism) -> None:
+    """Refuse a model whose equations agree at its own numbers alone, before any is drawn."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RedundantConstraintWarning)
+        try:
+            compile_model(mechanism)
+        except RedundantConstraintWarning as found:
+            raise InputError(
+                f"{mechanism.name} is overconstrained: it moves at its own lengths and angles, and "
+                f"would not at those of a variant. {found}"
+            ) from None
 
 
 def _drawn(mechanism: Mechanism, random: Random, choices: Choices) -> _Change:
@@ -136,7 +155,7 @@ class _VariantBuilder:
         self._made = type(mechanism)(
             mechanism.name,
             length_unit=mechanism.length_unit,
-            end=mechanism.end_given,
+            end=float(sympy.sympify(mechanism.end_given).subs(self._values)),
             points=mechanism.points,
         )
         self._bodies = {body.name: self._body(body) for body in mechanism.bodies}

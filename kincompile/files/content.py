@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-MAX_BYTES = 16_000_000
-"""Largest file; a mechanism of 10,000 bodies has a quarter of this."""
+MAX_BYTES = 8_000_000
+"""Largest file, read or refused in seconds; a mechanism of 10,000 bodies has half of this."""
 
 
 def file_content(
@@ -51,6 +51,8 @@ def file_content(
                     f"cannot read {shown}: it is a pipe or a device; save its content in a file"
                 )
             content = stream.read(most + 1) or b""
+    except InputError:  # it is a ValueError, too
+        raise
     except FileNotFoundError:
         near = [path.with_name(path.name + ending) for ending in endings if path.name]
         hints = (f"did you mean {escaped(other)}?" for other in near if other.is_file())

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 MAX_VALUES = 500_000
 """Values in a file; a mechanism of 10,000 bodies has about half of this."""
+MAX_LINES = 500_000
+"""Lines in a file, comments too: Python's reader of TOML takes two microseconds for each."""
 MAX_NESTING = 32
 """Lists and tables within each other."""
 MAX_KEY_PARTS = 4
@@ -91,11 +93,14 @@ def _check_bounds(path: Path, text: str, outline: re.Pattern[str]) -> None:
     Raises
     ------
     ModelError
-        If the text has too many values, numbers of too many digits, keys of too many parts, lists
-        too deep in each other, or a text of several lines that does not end; with the line.
+        If the text has too many values or lines, numbers of too many digits, keys of too many
+        parts, lists too deep in each other, or a text of several lines that does not end; with the
+        line.
     """
     if sum(text.count(mark) for mark in ",=[{") > MAX_VALUES:
         raise ModelError(f"{escaped(path)}: the file has more than {MAX_VALUES:,} values")
+    if text.count("\n") > MAX_LINES:
+        raise ModelError(f"{escaped(path)}: the file has more than {MAX_LINES:,} lines")
     if digits := _DIGITS.search(text):
         raise _problem(path, text, digits.start(), "a number has thousands of digits")
     depth = 0

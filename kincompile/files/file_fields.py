@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING, Any
 
 from kincompile.files.data_text import MAX_PROBLEMS, listed_problems
-from kincompile.files.safe_expressions import ExpressionError, parse_expression
+from kincompile.files.file_format import FIELDS, PLAIN_NUMBER, TARGETS
+from kincompile.files.formula_text import ExpressionError
+from kincompile.files.safe_expressions import parse_expression
 from kincompile.model.expressions import evaluate
 from kincompile.names import LONGEST, escaped, listed, name_problem, shown, suggestion, unit_problem
 
@@ -82,6 +85,49 @@ class FieldReader:
         if missing:
             self.problem(address, f"no {listed(missing, 20)}; fields are: {listed(fields, 20)}")
         return not missing
+
+    def fits(self, value: Any, schema: Mapping[str, Any], address: Address) -> None:
+        """Check a value against its schema; formulas are read later."""
+        if "$ref" in schema:
+            self._fits_table(value, schema["$ref"].rpartition("/")[2], address)
+        elif "anyOf" in schema:
+            likely = [item for item in schema["anyOf"] if _may_be(value, item)]
+            if likely:
+                self.fits(value, likely[0], address)
+            else:
+                self.problem(address, f"expected {_expected(schema)}, not {shown(value)}")
+        elif not _may_be(value, schema):
+            self.problem(address, f"expected {_expected(schema)}, not {shown(value)}")
+        elif isinstance(value, dict):
+            for key, item in value.items():
+                self.fits(item, schema["additionalProperties"], (*address, key))
+        elif isinstance(value, list):
+            least, most = schema.get("minItems", 0), schema.get("maxItems", len(value))
+            if not least <= len(value) <= most:
+                count = f"{least}" if least == most else f"at least {least}"
+                self.problem(address, f"expected a list of {count}, not {shown(value)}")
+            for k, item in enumerate(value):
+                self.fits(item, schema["items"], (*address, k))
+
+    def _fits_table(self, value: Any, name: str, address: Address) -> None:
+        """Check a formula, a target of a fit, or a table of a name of the format."""
+        if name in ("expression", "constant"):
+            is_formula = isinstance(value, str)
+            if not is_formula or (name == "constant" and _is_number(value)):
+                self.constant(value, address, {})
+            return
+        if not isinstance(value, dict):
+            self.problem(address, f"expected a table of fields, not {shown(value)}")
+            return
+        kinds = TARGETS if name == "target" else {name: FIELDS[name]}
+        given = [kind for kind in kinds if kind in value or name != "target"]
+        if len(given) != 1:
+            self.problem(address, f"expected one target: {listed(TARGETS)}, not {shown(value)}")
+            return
+        fields = kinds[given[0]]
+        self.has_fields(address, value, fields)
+        for key in fields.keys() & value.keys():
+            self.fits(value[key], fields[key].schema, (*address, key))
 
     def rows(
         self, data: Mapping[str, Any], section: str
@@ -169,23 +215,6 @@ class FieldReader:
             self.problem(address, f"{shown(given)} is not a finite number")
         return 1.0
 
-    def texts(self, given: Any, address: Address) -> tuple[str, ...] | None:
-        """Return a list of names, None where none is given."""
-        if given is None:
-            return None
-        if isinstance(given, list) and all(isinstance(item, str) for item in given):
-            return tuple(given)
-        self.problem(address, f"expected a list of names in quotes, not {shown(given)}")
-        return None
-
-    def count(self, given: Any, address: Address, most: int, least: int = 1) -> int | None:
-        """Return a whole number, None where none is given."""
-        if given is None or (type(given) is int and least <= given <= most):
-            return given
-        text = f"expected a whole number from {least} to {most:,}, not {shown(given)}"
-        self.problem(address, text)
-        return 1
-
     def expressions(
         self, value: Any, address: Address, names: Mapping[str, sympy.Expr], what: str, count: int
     ) -> list[float | sympy.Expr]:
@@ -196,9 +225,39 @@ class FieldReader:
         return [self.expression(item, (*address, k), names) for k, item in enumerate(value)]
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
+_TYPES: Mapping[str, type | tuple[type, ...]] = {
+    "object": dict, "array": list, "string": str, "boolean": bool, "integer": int,
+    "number": (int, float),
+}  # fmt: skip
+
+
+def _may_be(value: Any, schema: Mapping[str, Any]) -> bool:
+    """Return whether a value is of the type of a schema, and within its limits."""
+    if "$ref" in schema:
+        is_table = not schema["$ref"].endswith(("/expression", "/constant"))
+        return isinstance(value, dict if is_table else int | float | str)
+    if "enum" in schema or "const" in schema:
+        return value in schema.get("enum", (schema.get("const"),))
+    kind = str(schema["type"])
+    if isinstance(value, bool) != (kind == "boolean") or not isinstance(value, _TYPES[kind]):
         return False
-    return True
+    return kind != "integer" or bool(schema["minimum"] <= value <= schema["maximum"])
+
+
+def _is_number(text: str) -> bool:
+    return re.search(PLAIN_NUMBER, text) is not None
+
+
+def _expected(schema: Mapping[str, Any]) -> str:
+    """Return in words what a schema takes."""
+    if "description" in schema:
+        return str(schema["description"])
+    if "enum" in schema or "const" in schema:
+        return listed(shown(item) for item in schema.get("enum", (schema.get("const"),)))
+    if schema["type"] == "integer":
+        return f"a whole number from {schema['minimum']} to {schema['maximum']:,}"
+    words = {
+        "object": "names and values", "array": "a list", "string": "a text in quotes",
+        "boolean": "true or false", "number": "a number",
+    }  # fmt: skip
+    return words[schema["type"]]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from kincompile.files.dimensions import PLANE, SPACE, dimensions
 from kincompile.model.arguments import Kind
 from kincompile.model.laws import RISES
-from kincompile.names import MOST_CHARACTERS
+from kincompile.names import LARGEST_SEED, MOST_CHARACTERS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,6 +22,10 @@ MOST_POINTS = 10_000_000
 """Largest time grid that a file may ask for."""
 MOST_VARIANTS = 10_000_000
 """Largest number of values of all parameters together that a file may ask for."""
+MOST_SAMPLES = 2**24
+"""Largest number of samples of a tolerance analysis."""
+MOST_SEARCHED, MOST_STARTS = 2**20, 10_000
+"""Largest number of sets that a fit may search, and of starts that it may follow."""
 MOST_DRAWN, MOST_JOINTS = 300, 30
 """Largest number of joints, parts and parameters of a drawing, and of joints of one link."""
 SMOOTHNESS = 4
@@ -62,24 +66,30 @@ _NAME: dict[str, Any] = {
 }  # fmt: skip
 _NUMBER: dict[str, Any] = {"type": "number"}
 _EXPRESSION: dict[str, Any] = _ref("expression")
+_CONSTANT: dict[str, Any] = _ref("constant")
+PLAIN_NUMBER = r"^\s*[+-]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)([eE][+-]?\d+)?\s*$"
+"""A number in quotes, which a constant may not be: it needs none."""
 
 
-def _components(count: int) -> dict[str, Any]:
-    """Return the schema of so many numbers or formulas."""
-    return {"type": "array", "items": _EXPRESSION, "minItems": count, "maxItems": count}
+def _components(count: int, of: Mapping[str, Any] = _EXPRESSION) -> dict[str, Any]:
+    """Return the schema of a fixed number of numbers or formulas."""
+    return {"type": "array", "items": of, "minItems": count, "maxItems": count}
 
 
-_POINT = _components(2)
+_POINT, _PAIR = _components(2), _components(2, _CONSTANT)
 _TRIPLE = _components(3)
 _NUMBERS: dict[str, Any] = _array(_NUMBER, 6)
 _VALUES: dict[str, Any] = _array(_EXPRESSION, 3)
-_NAMES: dict[str, Any] = _array(_TEXT)
+_NAMES: dict[str, Any] = _array(_TEXT) | {"description": "a list of names in quotes"}
 _VARIANTS: dict[str, Any] = {"type": "integer", "minimum": 1, "maximum": MOST_VARIANTS}
 _LAW: dict[str, Any] = {"enum": list(RISES)}
 _CORNERS: dict[str, Any] = {"type": "boolean"}
 
 
-_SEED: dict[str, Any] = {"type": "integer", "minimum": 0}
+_SEED: dict[str, Any] = {"type": "integer", "minimum": 0, "maximum": LARGEST_SEED}
+
+_SWEPT = {"description": "a list of values, or { from = 0.2, to = 0.6, count = 5 }"}
+_DEVIATION = {"description": "a number, two limits, or { low = -1e-4, high = 2e-4 }"}
 
 DISTRIBUTIONS = ("normal", "uniform", "truncated")
 SEARCHES = ("sobol", "differential evolution")
@@ -91,7 +101,7 @@ TASKS = ("tolerance", "fit", "sweep")
 
 
 def _list(name: str) -> dict[str, Any]:
-    return _array(_ref(name))
+    return _array(_ref(name)) | {"description": "a list of tables"}
 
 
 FIELDS: Mapping[str, Mapping[str, Field]] = {
@@ -117,36 +127,36 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
     },
     "tolerance": {
         "of": _optional(_NAMES),
-        "parameters": _optional(_map(_any_of(_EXPRESSION, _POINT, _ref("deviation")))),
-        "clearances": _optional(_map(_EXPRESSION)),
-        "samples": _optional(_VARIANTS),
+        "parameters": _optional(_map(_any_of(_CONSTANT, _PAIR, _ref("deviation")) | _DEVIATION)),
+        "clearances": _optional(_map(_CONSTANT)),
+        "samples": _optional({**_VARIANTS, "minimum": 0, "maximum": MOST_SAMPLES}),
         "seed": _optional(_SEED),
     },
     "deviation": {
-        "low": Field(_EXPRESSION),
-        "high": Field(_EXPRESSION),
+        "low": Field(_CONSTANT),
+        "high": Field(_CONSTANT),
         "distribution": _optional({"enum": list(DISTRIBUTIONS)}),
-        "sigmas": _optional(_EXPRESSION),
+        "sigmas": _optional(_CONSTANT),
     },
     "fit": {
-        "parameters": Field(_map(_POINT)),
+        "parameters": Field(_map(_PAIR)),
         "targets": Field(_list("target")),
-        "samples": _optional(_VARIANTS),
-        "starts": _optional(_VARIANTS),
+        "samples": _optional({**_VARIANTS, "maximum": MOST_SEARCHED}),
+        "starts": _optional({**_VARIANTS, "maximum": MOST_STARTS}),
         "search": _optional({"enum": list(SEARCHES)}),
         "minimizer": _optional({"enum": list(MINIMIZERS)}),
         "seed": _optional(_SEED),
     },
     "sweep": {
-        "parameters": Field(_map(_any_of(_array(_EXPRESSION, 1), _ref("span")))),
+        "parameters": Field(_map(_any_of(_array(_CONSTANT, 1), _ref("span")) | _SWEPT)),
         "samples": _optional(_VARIANTS),
         "product": _optional({"type": "boolean"}),
         "columns": _optional(_NAMES),
         "measures": _optional(_NAMES),
     },
     "span": {
-        "from": Field(_EXPRESSION),
-        "to": Field(_EXPRESSION),
+        "from": Field(_CONSTANT),
+        "to": Field(_CONSTANT),
         "count": _optional(_VARIANTS),
     },
     "sketch": {
@@ -156,12 +166,12 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
         "parts": Field(_list("part")),
     },
     "analysis": {
-        "end": _optional(_EXPRESSION),
+        "end": _optional(_CONSTANT),
         "points": _optional({"type": "integer", "minimum": 1, "maximum": MOST_POINTS}),
     },
     "parameter": {
         "name": Field(_NAME),
-        "default": Field(_EXPRESSION),
+        "default": Field(_CONSTANT),
         "unit": _optional(_TEXT),
         "range": _optional(_POINT),
     },
@@ -253,32 +263,34 @@ def _line(place: Mapping[str, Any]) -> dict[str, Field]:
     return {"along": along, "on": _optional(_NAME)}
 
 
-_WEIGHT: Mapping[str, Field] = {"weight": _optional(_EXPRESSION)}
+_WEIGHT: Mapping[str, Field] = {"weight": _optional(_CONSTANT)}
 _PASSING: Mapping[str, Field] = {
-    "times": _optional(_array(_EXPRESSION)),
+    "times": _optional(_array(_CONSTANT)),
     **_WEIGHT,
-    "within": _optional(_EXPRESSION),
-    "between": _optional(_POINT),
+    "within": _optional(_CONSTANT),
+    "between": _optional(_PAIR),
 }
-_ROWS: dict[str, Any] = _array(_array(_EXPRESSION))
+_ROWS: dict[str, Any] = _array(_array(_CONSTANT) | {"description": "a list of numbers"}) | {
+    "description": "a list of lists of numbers"
+}
 
 TARGETS: Mapping[str, Mapping[str, Field]] = {
     "path": {"path": Field(_TEXT), "points": Field(_ROWS), **_PASSING},
     "value": {
-        "value": Field(_TEXT), "values": Field(_array(_EXPRESSION)), **_PASSING,
+        "value": Field(_TEXT), "values": Field(_array(_CONSTANT)), **_PASSING,
     },
     "pose": {
         "pose": Field(_TEXT), "poses": Field(_ROWS),
-        "angle_weight": _optional(_EXPRESSION), **_PASSING,
+        "angle_weight": _optional(_CONSTANT), **_PASSING,
     },
     "time_ratio": {
-        "time_ratio": Field(_TEXT), "ratio": Field(_EXPRESSION), **_WEIGHT,
-        "within": _optional(_EXPRESSION),
+        "time_ratio": Field(_TEXT), "ratio": Field(_CONSTANT), **_WEIGHT,
+        "within": _optional(_CONSTANT),
     },
     "limit": {
         "limit": Field(_TEXT),
-        "least": _optional(_EXPRESSION),
-        "most": _optional(_EXPRESSION),
+        "least": _optional(_CONSTANT),
+        "most": _optional(_CONSTANT),
         "title": _optional(_TEXT),
     },
     "moves": {"moves": Field({"const": True})},
@@ -387,6 +399,11 @@ def model_schema() -> dict[str, Any]:
             "expression": {
                 "description": "a number, or a formula such as -a/2 + sin(omega*t)",
                 "type": ["number", "string"],
+            },
+            "constant": {
+                "description": "a number without quotes, or a formula such as 30*deg",
+                "type": ["number", "string"],
+                "not": {"type": "string", "pattern": PLAIN_NUMBER},
             },
             **tables,
             **in_space,

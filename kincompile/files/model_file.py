@@ -114,9 +114,16 @@ class _ModelReader(BodyReader):
             "outputs": [*drawn.outputs, *(item for item in (*points, *outputs) if item)],
             "loads": [item for item in loads if item],
             "gravity": self.place(data, (), "gravity"),
-            "tasks": {key: data[key] for key in TASKS if key in data},
+            "tasks": self._tasks(data),
         }
         return self._checked(name, content, options)
+
+    def _tasks(self, data: Row) -> Row:
+        """Return the tables of commands, whose fields are those of the format."""
+        found = {key: data[key] for key in TASKS if key in data}
+        for key, table in found.items():
+            self.fits(table, FIELDS["model"][key].schema, (key,))
+        return found
 
     def _is_model(self, data: Any) -> bool:
         """Check that the file is of this format, and of this version."""

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import ast
 import math
-import warnings
-from bisect import bisect_right
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from kincompile.files.text_places import TextPlace, TextPlaces
+from kincompile.files.formula_text import EXPECTED, ExpressionError, Source
+from kincompile.files.text_places import TextPlace
 from kincompile.model.directions import angle_between, length_of, turning
 from kincompile.model.expressions import NotAnExpressionError, as_expression, deg, evaluate
 from kincompile.model.laws import RISES
@@ -38,9 +37,13 @@ MAX_EXPANDED = 20_000
 MAX_EXPANDED_DEPTH = 120
 """Levels of one expression, each name counted with all that it stands for."""
 MAX_EXPONENT = 64
-"""Largest exponent."""
+"""Largest exponent; powers of powers count with the product of their exponents."""
 MAX_BITS = 1024
 """Bits of a whole number or fraction: as large as a double can be."""
+MAX_DENOMINATORS = 16 * MAX_BITS
+"""Bits of the denominators of all terms: a sum of fractions takes time with the square of them."""
+MAX_PIECES_IN_CONDITIONS = 6
+"""Pieces of each Piecewise in a condition: a comparison is made for each combination of them."""
 
 FUNCTIONS: Mapping[str, tuple[Callable[..., sympy.Expr], int, int]] = {
     **{
@@ -65,30 +68,6 @@ _OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)
 _RELATIONS: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: sympy.Lt, ast.LtE: sympy.Le, ast.Gt: sympy.Gt, ast.GtE: sympy.Ge,
 }  # fmt: skip
-_LOOKALIKES = {
-    "\u2212": "-", "\u2013": "-", "\u00b7": "*", "\u00d7": "*", "\u00f7": "/", "\u00b2": "^2",
-    "\u00b3": "^3", "\u03c0": "pi", "'": "a name such as phi_dot for a rate",
-}  # fmt: skip
-_PUNCTUATION = frozenset("_.,+-*/^()[]<>= \t\r\n")
-_EXPECTED = "numbers, names, + - * / ^ ( ) and functions"
-
-
-class ExpressionError(NotAnExpressionError):
-    """A text that is not an expression.
-
-    Attributes
-    ----------
-    problem
-        What is wrong, what was expected, and the names that exist.
-    line, column
-        Where, counted from 1.
-    """
-
-    def __init__(self, problem: str, line: int, column: int) -> None:
-        super().__init__(f"line {line}, column {column}: {problem}")
-        self.problem = problem
-        self.line = line
-        self.column = column
 
 
 class UnknownNameError(ExpressionError):
@@ -128,13 +107,13 @@ def parse_expression(
         If the text holds anything but numbers, declared names, arithmetic and the functions of
         `FUNCTIONS`, or is longer or deeper than the limits of this module.
     """
-    source = _Source(text, place or TextPlace())
+    source = Source(text, place or TextPlace())
     if len(text) > MAX_LENGTH:
         raise source.error(
             f"the expression has {len(text)} characters; at most {MAX_LENGTH} are read", 0
         )
     if not text.strip():
-        raise source.error(f"the expression is empty; expected {_EXPECTED}", 0)
+        raise source.error(f"the expression is empty; expected {EXPECTED}", 0)
     source.check_characters()
     source.check_brackets()
     try:
@@ -148,6 +127,11 @@ def parse_expression(
         raise source.error(str(error), 0) from error
     except RecursionError:
         raise source.error("the expression is nested too deeply", 0) from None
+    except (ArithmeticError, NotImplementedError, TypeError, ValueError) as error:
+        # SymPy's own: it takes a large factor for a prime, for one, and then finds that it is none.
+        raise source.error(
+            "SymPy cannot evaluate this expression; write large numbers as decimals", 0
+        ) from error
 
 
 @lru_cache(maxsize=10_000)
@@ -160,104 +144,26 @@ def extent(value: sympy.Basic) -> tuple[int, int]:
     return 1 + sum(parts for parts, _ in inner), 1 + max((deep for _, deep in inner), default=0)
 
 
-class _Source:
-    """The text as written, as Python reads it, and the way from one to the other."""
-
-    def __init__(self, text: str, place: TextPlace) -> None:
-        self.text = text
-        self._place = place
-        # One line between brackets: line breaks mean nothing inside a formula. `^` is Python's
-        # exclusive or, which binds weaker than +, so it becomes `**` before the grammar sees it.
-        self._python = "(" + "".join(" " if ch.isspace() else ch for ch in text) + ")"
-        self._carets = [k + 1 for k, ch in enumerate(text) if ch == "^"]
-        self._python = self._python.replace("^", "**")
-        self._moved = [k + number for number, k in enumerate(self._carets)]
-
-    def tree(self) -> ast.expr:
-        """Return the syntax tree of the text."""
-        try:
-            with warnings.catch_warnings():
-                # Python warns of "1if" and the like; here it is not a formula.
-                warnings.simplefilter("error")
-                return ast.parse(self._python, mode="eval").body
-        except SyntaxError as error:
-            raise self._syntax_error(error) from None
-        except (RecursionError, MemoryError):
-            raise self.error("the expression is nested too deeply", 0) from None
-        except (ValueError, Warning) as error:
-            raise self.error(f"this is not an expression: {error}", 0) from None
-
-    def offset(self, column: int) -> int:
-        """Return the place in the text of a column of what Python read."""
-        return min(max(column - 1 - bisect_right(self._moved, column - 1), 0), len(self.text))
-
-    def check_characters(self) -> None:
-        """Refuse what no formula needs, before Python gives it a meaning."""
-        for k, character in enumerate(self.text):
-            if character in _PUNCTUATION or (character.isascii() and character.isalnum()):
-                continue
-            hint = _LOOKALIKES.get(character)
-            remedy = f"write {hint}" if hint else f"expected {_EXPECTED}"
-            raise self.error(f"the character {character!r} is not understood; {remedy}", k)
-
-    def check_brackets(self) -> None:
-        """Refuse a bracket without a partner."""
-        bracket = unbalanced_bracket(self.text)
-        if bracket is not None:
-            raise self.error(*bracket)
-
-    def error(self, problem: str, offset: int) -> ExpressionError:
-        """Return an error at a place in the text."""
-        place = TextPlaces(self.text, self._place)[offset]
-        return ExpressionError(problem, place.line, place.column)
-
-    def node_error(self, problem: str, node: ast.AST) -> ExpressionError:
-        """Return an error at a node."""
-        return self.error(problem, self.offset(getattr(node, "col_offset", 0)))
-
-    def _syntax_error(self, error: SyntaxError) -> ExpressionError:
-        offset = len(self.text)
-        if error.lineno == 1 and error.offset:
-            offset = self.offset(error.offset - 1)
-        found = self.text[offset : offset + 12].split("\n")[0].strip()
-        what = f"found {found!r}" if found else "the expression ends too early"
-        return self.error(
-            f"{what}, where an operator, a bracket or a value was expected; write a product as 2*x "
-            f"and a power as x^2",
-            offset,
-        )
-
-
-def unbalanced_bracket(text: str) -> tuple[str, int] | None:
-    """Return a message about an unbalanced bracket and its offset, or None."""
-    pairs = {")": "(", "]": "[", "}": "{"}
-    open_brackets: list[tuple[str, int]] = []
-    for k, character in enumerate(text):
-        if character in pairs.values():
-            open_brackets.append((character, k))
-        elif character in pairs:
-            if not open_brackets:
-                return f"this {character!r} closes a bracket that was never opened", k
-            opened, _ = open_brackets.pop()
-            if opened != pairs[character]:
-                return f"{character!r} closes a bracket that was opened with {opened!r}", k
-    if open_brackets:
-        opened, k = open_brackets[-1]
-        return f"this {opened!r} is never closed", k
-    return None
+@lru_cache(maxsize=10_000)
+def _pieces(value: sympy.Basic) -> int:
+    """Return how many pieces an expression has, those that it shares counted each time."""
+    own = len(value.args) if isinstance(value, sympy.Piecewise) else 0
+    return own + sum(map(_pieces, value.args))
 
 
 class _Reader:
     """Rebuilds a syntax tree in SymPy, node by node."""
 
     def __init__(
-        self, source: _Source, names: Mapping[str, sympy.Expr], refused: Mapping[str, str]
+        self, source: Source, names: Mapping[str, sympy.Expr], refused: Mapping[str, str]
     ) -> None:
         self._source = source
         self._names = names
         self._refused = refused
         self._nodes = 0
         self._expanded = 0
+        self._denominators = 0.0
+        self._pieces_in_conditions = 0
 
     def read(self, node: ast.expr, depth: int = 0) -> sympy.Expr:
         """Return the value of a node."""
@@ -278,7 +184,7 @@ class _Reader:
                 raise self._error("a comparison stands in Piecewise((value, condition), ...)", node)
             case _:
                 what = _DESCRIPTIONS.get(type(node), "this")
-                problem = f"{what} is not allowed here; expected {_EXPECTED}"
+                problem = f"{what} is not allowed here; expected {EXPECTED}"
                 raise self._error(f"{problem}: {listed(FUNCTIONS, 40)}", node)
         return self._checked(value, node)
 
@@ -311,7 +217,7 @@ class _Reader:
     def _number(self, node: ast.Constant) -> sympy.Expr:
         value = node.value
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self._error(f"{value!r} is not a real number; expected {_EXPECTED}", node)
+            raise self._error(f"{value!r} is not a real number; expected {EXPECTED}", node)
         if isinstance(value, float) and not math.isfinite(value):
             raise self._error("this number is too large for floating point", node)
         return sympy.Integer(value) if isinstance(value, int) else sympy.Float(value)
@@ -337,7 +243,7 @@ class _Reader:
         first: ast.expr = node
         while isinstance(first, ast.BinOp):
             if not isinstance(first.op, _OPERATORS):
-                raise self._error(f"only + - * / ^ are operators; expected {_EXPECTED}", first)
+                raise self._error(f"only + - * / ^ are operators; expected {EXPECTED}", first)
             links.append(first)
             first = first.left
         # One sum of all the terms, one product of all the factors: SymPy would sort a growing sum
@@ -347,16 +253,26 @@ class _Reader:
         for link in reversed(links):
             self._count(link, depth)
             if isinstance(link.op, ast.Add | ast.Sub):
-                terms.append(self._checked(sympy.Mul(*factors), link))
+                terms.append(self._term(factors, link))
                 factors = self._factors(link.right, depth)
                 if isinstance(link.op, ast.Sub):
                     factors.insert(0, sympy.S.NegativeOne)
                 continue
             if terms:  # the sum so far stands in brackets
-                total = sympy.Add(*terms, sympy.Mul(*factors))
+                total = sympy.Add(*terms, self._term(factors, link))
                 terms, factors = [], [self._checked(total, link)]
             factors = self._extended(factors, link, self.read(link.right, depth + 1))
-        return self._checked(sympy.Add(*terms, sympy.Mul(*factors)), node)
+        return self._checked(sympy.Add(*terms, self._term(factors, node)), node)
+
+    def _term(self, factors: list[sympy.Expr], node: ast.BinOp) -> sympy.Expr:
+        """Return the product of factors, which is a term of a sum."""
+        value = self._checked(sympy.Mul(*factors), node)
+        number = value.as_coeff_Mul()[0]
+        if isinstance(number, sympy.Rational):
+            self._denominators += math.log2(int(number.q))
+        if self._denominators > MAX_DENOMINATORS:
+            raise self._error("the fractions have too many digits; write decimals", node)
+        return value
 
     def _factors(self, node: ast.expr, depth: int) -> list[sympy.Expr]:
         """Return a value as a list of factors, the sign before it as a factor of its own."""
@@ -376,7 +292,9 @@ class _Reader:
                 raise self._error("this divides by zero", link.right)
             return [*factors, sympy.Pow(right, -1)]
         self._check_exponent(right, link.right)
-        return [sympy.Pow(sympy.Mul(*factors), right)]
+        base = sympy.Mul(*factors)
+        self._check_power(base, right, link)
+        return [self._checked(sympy.Pow(base, right), link)]
 
     def _check_exponent(self, exponent: sympy.Expr, node: ast.expr) -> None:
         if not exponent.is_number:
@@ -385,6 +303,19 @@ class _Reader:
         size = evaluate(exponent, {})
         if size is None or abs(size) > MAX_EXPONENT:
             raise self._error(f"the exponent is beyond {MAX_EXPONENT}, or not a number", node)
+
+    def _check_power(self, base: sympy.Expr, exponent: sympy.Expr, node: ast.BinOp) -> None:
+        """Refuse a power that would have too many digits, or too large an exponent, unseen."""
+        for factor in sympy.Mul.make_args(base):
+            inner, own = factor.as_base_exp()
+            product = own * exponent
+            if not product.is_Rational:
+                continue
+            if isinstance(inner, sympy.Rational):
+                if _bits(inner) * abs(product) > MAX_BITS:
+                    raise self._error("this number is too large for floating point", node)
+            elif abs(product) > MAX_EXPONENT:
+                raise self._error(f"the exponent is beyond {MAX_EXPONENT}", node)
 
     def _checked(self, value: sympy.Expr, node: ast.AST) -> sympy.Expr:
         """Refuse a number that no double can hold: the next operation on it could be endless."""
@@ -432,6 +363,16 @@ class _Reader:
             raise self._error(f"the last piece must hold everywhere else; {form}", node)
         return sympy.Piecewise(*pieces)
 
+    def _count_pieces(self, compared: list[sympy.Expr], node: ast.expr) -> None:
+        """Count the pieces that are compared, before SymPy combines each with each."""
+        self._pieces_in_conditions += sum(map(_pieces, compared))
+        if self._pieces_in_conditions > MAX_PIECES_IN_CONDITIONS:
+            raise self._error(
+                f"the values in conditions have more than {MAX_PIECES_IN_CONDITIONS} pieces; "
+                "compare values without Piecewise",
+                node,
+            )
+
     def _condition(self, node: ast.expr, depth: int) -> Any:
         self._count(node, depth)
         match node:
@@ -442,11 +383,17 @@ class _Reader:
                 return connective(*(self._condition(item, depth + 1) for item in node.values))
             case ast.Compare() if all(type(op) in _RELATIONS for op in node.ops):
                 values = [self.read(item, depth + 1) for item in (node.left, *node.comparators)]
+                self._count_pieces(values, node)
                 pairs = zip(node.ops, values, values[1:], strict=False)
                 return sympy.And(*(_RELATIONS[type(op)](a, b) for op, a, b in pairs))
         raise self._error(
             "a condition is a comparison with < <= > >=, joined by and, or; or True", node
         )
+
+
+def _bits(value: sympy.Rational) -> float:
+    """Return how many bits a fraction has, in the longer of its two numbers."""
+    return math.log2(max(abs(int(value.p)), int(value.q)))
 
 
 def _fits(value: sympy.Number) -> bool:

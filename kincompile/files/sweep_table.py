@@ -17,7 +17,6 @@ from kincompile.files.content import file_content
 from kincompile.files.data_text import listed_problems, read_json, read_toml
 from kincompile.files.file_fields import FieldReader
 from kincompile.files.file_format import FIELDS, MOST_VARIANTS
-from kincompile.names import shown
 
 if TYPE_CHECKING:
     import os
@@ -77,37 +76,24 @@ class _TableReader(FieldReader):
         row = data.get("sweep") if isinstance(data, dict) else None
         if row is None:
             return None
-        if not isinstance(row, dict):
-            self.problem(("sweep",), f"expected a table of fields, not {shown(row)}")
+        self.fits(row, FIELDS["model"]["sweep"].schema, ("sweep",))
+        if self.problems:
             return None
-        if not self.has_fields(("sweep",), row, FIELDS["sweep"]):
-            return None
-        samples = self.count(row.get("samples"), ("sweep", "samples"), MOST_VARIANTS)
-        given = row["parameters"]
-        if not isinstance(given, dict):
-            self.problem(("sweep", "parameters"), f"expected names and values, not {shown(given)}")
-            given = {}
-        parameters = {name: self._values(name, value) for name, value in given.items()}
+        samples = row.get("samples")
+        parameters = {name: self._values(name, value) for name, value in row["parameters"].items()}
         self._require_samples(parameters, samples)
         self._require_few(parameters, samples or 1)
-        columns, measures = (
-            self.texts(row.get(key), ("sweep", key)) for key in ("columns", "measures")
-        )
-        return SweepTable(parameters, samples, self._product(row), columns, measures or ())
+        columns = tuple(row["columns"]) if "columns" in row else None
+        measures = tuple(row.get("measures", ()))
+        return SweepTable(parameters, samples, row.get("product", False), columns, measures)
 
     def _values(self, name: str, given: Any) -> tuple[float, ...] | Span:
         """Return the values of a parameter, or from where to where they go."""
         address = ("sweep", "parameters", name)
         if isinstance(given, list):
             return tuple(self.finite(item, (*address, k)) for k, item in enumerate(given))
-        if not isinstance(given, dict):
-            text = "expected a list of values, or { from = 0.2, to = 0.6, count = 5 }"
-            self.problem(address, f"{text}, not {shown(given)}")
-            return ()
-        if not self.has_fields(address, given, FIELDS["span"]):
-            return ()
         first, last = (self.finite(given[key], (*address, key)) for key in ("from", "to"))
-        return Span(first, last, self.count(given.get("count"), (*address, "count"), MOST_VARIANTS))
+        return Span(first, last, given.get("count"))
 
     def _require_samples(
         self, parameters: Mapping[str, tuple[float, ...] | Span], samples: int | None
@@ -129,10 +115,3 @@ class _TableReader(FieldReader):
                 f"{total:,} values are more than the {MOST_VARIANTS:,} of a file; sweep in Python"
             )
             self.problem(("sweep", "parameters"), text)
-
-    def _product(self, row: Mapping[str, Any]) -> bool:
-        """Return whether every value goes with every other one."""
-        given = row.get("product", False)
-        if not isinstance(given, bool):
-            self.problem(("sweep", "product"), f"expected true or false, not {shown(given)}")
-        return given is True

@@ -16,11 +16,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from kincompile.criteria import SOLVED
 from kincompile.errors import InputError, StructuralError
 from kincompile.ir.augmented import plan_augmented
 from kincompile.ir.differentiate import tangents
+from kincompile.ir.elimination import sizes_of
 from kincompile.ir.graph import Graph
 from kincompile.ir.inline import Entry
+from kincompile.ir.looks import MISSED
 from kincompile.ir.observing import bound, marked, observing_program
 from kincompile.ir.straight_solve import StraightSolve
 from kincompile.model.points import OutputColumn
@@ -74,7 +77,7 @@ def observing_accelerations(code: InlineProgram, left_out: Collection[int] = ())
 def with_motion(code: InlineProgram, left_out: Collection[int] = ()) -> Program:
     """Return the program of a mechanism whose accelerations and multipliers are quantities too."""
     motion = _Motion(code, left_out)
-    found = motion.solution()
+    found = motion.solution_or_nan()
     outputs = {"accelerations": found[: motion.n], "multipliers": found[motion.n :]}
     instance, values = bound(code.program, "motion", motion.graph, outputs)
     fingerprint = marked(code.program, "motion", tuple(sorted(left_out)))
@@ -84,11 +87,13 @@ def with_motion(code: InlineProgram, left_out: Collection[int] = ()) -> Program:
 def observing_corrections(code: InlineProgram, left_out: Collection[int] = ()) -> Program:
     """Return a program whose outputs lead coordinates and rates back to their constraints.
 
-    Its outputs are the changes of the coordinates, then those of the rates.
+    Its outputs are the changes of the coordinates, then those of the rates, then by what part of
+    their terms the accelerations there miss the equations of motion.
     """
     motion = _Motion(code, left_out)
-    found = motion.corrections()
+    found = [*motion.corrections(), motion.missed()]
     titles = [OutputColumn(correction(name, k), "") for k in range(2) for name in motion.names]
+    titles.append(OutputColumn(MISSED, ""))
     return _program(code, "corrections", motion, found, titles, left_out)
 
 
@@ -157,6 +162,7 @@ class _Motion:
             [(x.row, x.column, self.graph.value_of(x.node)) for x in M],
             [(x.row, x.column, code.number(x.node)) for x in self._Phi_q],
             left_out,
+            sizes_of(code),
         )
         jacobian = [Entry(self.n + x.row, x.column, x.node) for x in self._Phi_q]
         mirrored = [Entry(x.column, x.row, x.node) for x in jacobian]
@@ -210,10 +216,24 @@ class _Motion:
                 found[column] = graph.add(found[column], term)
         return found
 
+    def _right(self) -> list[int]:
+        """Return the right side of the equations of motion."""
+        gamma = self._column("gamma", self._m)
+        return [*self._pushed(self._column("Q", self.n), gamma), *gamma]
+
+    def missed(self) -> int:
+        """Return by what part of their terms accelerations and multipliers miss the equations."""
+        return self._solve.missed(self._right())
+
     def solution(self) -> list[int]:
         """Return the accelerations, then the multipliers."""
-        gamma = self._column("gamma", self._m)
-        return self._solve.solve([*self._pushed(self._column("Q", self.n), gamma), *gamma])
+        return self._solve.solve(self._right())
+
+    def solution_or_nan(self) -> list[int]:
+        """Return the same, NaN where they miss the equations."""
+        graph = self.graph
+        is_good = graph.compare("<=", self.missed(), graph.const(SOLVED))
+        return [graph.select(is_good, node, graph.nan()) for node in self.solution()]
 
     def accelerations(self) -> list[int]:
         """Return the accelerations, and the power of loads and drivers."""

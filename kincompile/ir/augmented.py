@@ -17,13 +17,16 @@ from typing import TYPE_CHECKING
 from kincompile.ir.elimination import (
     Matrix,
     Pivot,
+    Sizes,
     SolvePlan,
     eliminate,
     eliminate_constants,
     matrix_of,
+    power_of_two,
     substitute,
 )
 from kincompile.ir.graph import Graph
+from kincompile.ir.looks import Look
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Sequence
@@ -34,14 +37,19 @@ if TYPE_CHECKING:
 
 
 def plan_augmented(
-    n: int, m: int, M: Entries, Phi_q: Entries, left_out: Collection[int] = ()
+    n: int,
+    m: int,
+    M: Entries,
+    Phi_q: Entries,
+    left_out: Collection[int] = (),
+    sizes: Sizes | None = None,
 ) -> SolvePlan:
     """Plan the solve for n accelerations and m multipliers, which has as many right sides.
 
     Entries of a matrix are row, column and the number, None where it varies; M is positive definite
     for all movements that the equations with plain numbers allow. Multipliers of rows that are left
     out, since they repeat others, are zero. Determinants are the pivots that vary; their signs
-    never change.
+    never change. Looks are at the balance of forces, and at Phi_q. `sizes` are those of Phi_q.
     """
     graph = Graph()
     kept = [entry for entry in Phi_q if entry[0] not in left_out]
@@ -53,13 +61,15 @@ def plan_augmented(
     solution = {n + row: graph.const(0) for row in left_out}
     for row in solution:
         del matrix[row]
+    untouched, sides = {row: dict(entries) for row, entries in matrix.items()}, dict(right)
     pivots: list[Pivot] = []
     eliminated: Matrix = {}
-    for found in _safe_pivots(m, kept):
+    plain = Sizes()
+    for found in _safe_pivots(m, kept, sizes or Sizes()):
         row, column = n + found.row, found.column
         for pivot in (Pivot(row, column), Pivot(column, row)):
             pivots.append(pivot)
-            eliminated[pivot.row] = eliminate(graph, matrix, right, pivot)
+            eliminated[pivot.row] = eliminate(graph, matrix, right, pivot, plain)
     _mirror(matrix)
     first = [index for index in matrix if index < n]
     rest = [index for index in matrix if index >= n]
@@ -69,6 +79,10 @@ def plan_augmented(
         pivots.append(pivot)
         diagonal.append(eliminated[pivot.row][pivot.column])
     substitute(graph, pivots, eliminated, right, solution)
+    weights = _weights(n, sizes or plain)
+    forces = {row: entries for row, entries in untouched.items() if row < n}
+    equations = {row: entries for row, entries in untouched.items() if row >= n}
+    looks = tuple(Look.at(graph, x, sides, solution, weights) for x in (forces, equations))
     return SolvePlan(
         tuple(graph.nodes),
         tuple(varying),
@@ -77,15 +91,22 @@ def plan_augmented(
         (),
         tuple(diagonal),
         tuple(solution[index] for index in range(n + m)),
+        looks=looks,
     )
 
 
-def _safe_pivots(m: int, entries: Entries) -> Iterable[Pivot]:
+def _weights(n: int, sizes: Sizes) -> dict[int, float]:
+    """Return weights by which forces, and then equations, count alike."""
+    forces = {column: power_of_two(scale) for column, scale in sizes.scales.items()}
+    return forces | {n + row: weight for row, weight in sizes.weights().items()}
+
+
+def _safe_pivots(m: int, entries: Entries, sizes: Sizes) -> Iterable[Pivot]:
     """Return the pivots of Phi_q that are plain numbers."""
     graph = Graph()
     matrix, _ = matrix_of(graph, m, entries)
     right = {row: graph.input(row) for row in matrix}
-    return eliminate_constants(graph, matrix, right)
+    return eliminate_constants(graph, matrix, right, sizes)
 
 
 def _mirror(matrix: Matrix) -> None:

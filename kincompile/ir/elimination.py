@@ -9,13 +9,19 @@ factorization, shared by all right sides.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from kincompile.criteria import NOISE, probe_of, rounded, size_of, turning
 from kincompile.ir.graph import Constant, Graph, Node
 from kincompile.ir.inline import input_name
+from kincompile.ir.interpret import evaluator
+from kincompile.ir.looks import Look, parts_of
 from kincompile.structure.blocks import Block, block_triangular
 
 if TYPE_CHECKING:
@@ -47,6 +53,50 @@ class Pivot:
 
 
 @dataclass(frozen=True, slots=True)
+class Sizes:
+    """How large the entries of a matrix are at a generic position, in scales of the coordinates.
+
+    Of what elimination computes it is the sum of the sizes of the terms: what is left of them by
+    cancellation is judged by what it was made of.
+    """
+
+    # By row and column; of an entry that is missing, its own number, or nothing where it varies.
+    entries: dict[tuple[int, int], float] = field(default_factory=dict)
+    scales: Mapping[int, float] = field(default_factory=dict)  # by column; 1.0 where it is missing
+    # What entries that vary are at that position, as far as it is known, with their signs.
+    values: dict[tuple[int, int], float] = field(default_factory=dict)
+
+    def of(self, graph: Graph, row: int, column: int, node: int) -> float:
+        """Return the size of an entry."""
+        found = self.entries.get((row, column))
+        return self.number(graph, column, node) or 0.0 if found is None else found
+
+    def number(self, graph: Graph, column: int, node: int) -> float | None:
+        """Return the size that an entry has as it is; None where it is not a plain number."""
+        value = graph.value_of(node)
+        return None if value is None else abs(float(value)) * self.scales.get(column, 1.0)
+
+    def value(self, graph: Graph, row: int, column: int, node: int) -> float:
+        """Return what an entry is, in scales; NaN where it varies and nothing is known of it."""
+        value = graph.value_of(node)
+        if value is None:
+            return self.values.get((row, column), math.nan)
+        return float(value) * self.scales.get(column, 1.0)
+
+    def weights(self) -> dict[int, float]:
+        """Return weights by which rows count alike: powers of two, the same on every processor."""
+        terms: dict[int, float] = {}
+        for (row, _), size in self.entries.items():
+            terms[row] = terms.get(row, 0.0) + size
+        return {row: 1 / power_of_two(size) for row, size in terms.items()}
+
+
+def power_of_two(size: float) -> float:
+    """Return the power of two that is nearest to a size; 1.0 for nothing."""
+    return 2.0 ** round(math.log2(size)) if size else 1.0
+
+
+@dataclass(frozen=True, slots=True)
 class SolvePlan:
     """Straight-line code that solves Phi_q x = b."""
 
@@ -63,6 +113,7 @@ class SolvePlan:
     turned: tuple[int, ...] = ()
     # Size up to which blocks are straight-line code; LAPACK solves larger ones.
     straight: int = LARGEST_CLOSED_FORM
+    looks: tuple[Look, ...] = ()  # at what was eliminated in a fixed order
 
     @property
     def has_choices(self) -> bool:
@@ -91,8 +142,32 @@ def plan_solve(code: InlineProgram, *, is_straight: bool = False) -> SolvePlan |
         space = import_module("kincompile.ir.orientations")  # a planar model does without
         turn = partial(space.small_rotations, code)
     return plan_entries(
-        *size, jacobian_entries(code), left_out=left_out, is_straight=is_straight, turn=turn
+        *size,
+        jacobian_entries(code),
+        left_out=left_out,
+        is_straight=is_straight,
+        turn=turn,
+        sizes=sizes_of(code),
     )
+
+
+def sizes_of(code: InlineProgram) -> Sizes:
+    """Return the sizes of the entries of Phi_q where the runtime measures its equations too."""
+    program = code.program
+    guess = np.array([item.guess for item in program.coordinates])
+    units = (item.unit for item in program.coordinates)
+    angular = np.array(turning(units, [body.columns for body in program.bodies]), dtype=bool)
+    pattern = np.array(code.pattern(), dtype=np.intp).reshape(-1, 2)
+    evaluate: Any = evaluator(code)
+    with np.errstate(all="ignore"):
+        size = float(rounded(size_of(evaluate, pattern, angular, guess))) or 1.0
+        scales = np.where(angular, 1.0, size)
+        entries = evaluate(guess + scales * probe_of(guess.size))[1] * scales[pattern[:, 1]]
+    values = np.nan_to_num(entries, posinf=0.0, neginf=0.0)
+    sizes, known = (
+        dict(zip(code.pattern(), found.tolist(), strict=True)) for found in (np.abs(values), values)
+    )
+    return Sizes(sizes, dict(enumerate(scales.tolist())), known)
 
 
 def jacobian_entries(code: InlineProgram) -> list[tuple[int, int, Constant | None]]:
@@ -108,19 +183,20 @@ def plan_entries(
     left_out: Collection[int] = (),
     is_straight: bool = False,
     turn: Turn | None = None,
+    sizes: Sizes | None = None,
 ) -> SolvePlan | None:
     """Plan the solve of a matrix given by its entries, each a number or, where it varies, None.
 
     Rows that are left out are inputs that nothing reads. `turn` replaces the Euler parameters of
-    bodies by small rotations.
+    bodies by small rotations. Pivots are judged by the sizes of entries where these are known.
     """
-    graph = Graph()
+    graph, sizes = Graph(), sizes or Sizes()
     matrix, varying = matrix_of(graph, row_count, entries)
     right = {row: graph.input(f"b[{row}]") for row in matrix}
     given = tuple(right.values())
     for row in left_out:
         del matrix[row]
-    pivots, eliminated = _eliminate(graph, matrix, right)
+    pivots, eliminated = _eliminate(graph, matrix, right, sizes)
     rotations = [] if turn is None else turn(graph, matrix, right)
     rows = sorted(matrix)
     settled = {pivot.column for pivot in pivots}.union(*(item.columns for item in rotations))
@@ -134,10 +210,13 @@ def plan_entries(
     if blocks is None:
         return None
     determinants: list[int] = []
+    looks: list[Look] = []
     straight = LARGEST_CLOSED_FORM if turn is None else LARGEST_PIVOTED
     for block in blocks:
         if is_straight and len(block.rows) > straight:
-            determinants += _eliminate_block(graph, block, matrix, right, solution)
+            pivots_there, look = _eliminate_block(graph, block, matrix, right, solution, sizes)
+            determinants += pivots_there
+            looks.append(look)
         else:
             determinants += _solve_block(graph, block, matrix, right, solution, straight)
         for item in rotations:
@@ -156,6 +235,7 @@ def plan_entries(
         tuple(solution[column] for column in range(column_count)),
         tuple(item.columns[0] for item in rotations),
         straight,
+        tuple(looks),
     )
 
 
@@ -202,7 +282,7 @@ def substitute(
 
 
 def _eliminate(
-    graph: Graph, matrix: Matrix, right: dict[int, int], *, any_pivot: bool = False
+    graph: Graph, matrix: Matrix, right: dict[int, int], sizes: Sizes, *, any_pivot: bool = False
 ) -> tuple[list[Pivot], Matrix]:
     """Eliminate with plain numbers, or any pivot, as long as there are such.
 
@@ -210,55 +290,81 @@ def _eliminate(
     """
     pivots: list[Pivot] = []
     eliminated: Matrix = {}
-    while (pivot := _cheapest(graph, matrix, any_pivot)) is not None:
+    while (pivot := _cheapest(graph, matrix, sizes, any_pivot)) is not None:
         pivots.append(pivot)
-        eliminated[pivot.row] = eliminate(graph, matrix, right, pivot)
+        eliminated[pivot.row] = eliminate(graph, matrix, right, pivot, sizes)
     return pivots, eliminated
 
 
-def eliminate_constants(graph: Graph, matrix: Matrix, right: dict[int, int]) -> list[Pivot]:
+def eliminate_constants(
+    graph: Graph, matrix: Matrix, right: dict[int, int], sizes: Sizes
+) -> list[Pivot]:
     """Eliminate with plain numbers as long as there are such, and return the pivots."""
-    return _eliminate(graph, matrix, right)[0]
+    return _eliminate(graph, matrix, right, sizes)[0]
 
 
-def eliminate(graph: Graph, matrix: Matrix, right: dict[int, int], pivot: Pivot) -> dict[int, int]:
+def eliminate(
+    graph: Graph, matrix: Matrix, right: dict[int, int], pivot: Pivot, sizes: Sizes
+) -> dict[int, int]:
     """Eliminate a coordinate from all other rows; return the row of the pivot, taken out."""
     row = matrix.pop(pivot.row)
+    own = {column: sizes.of(graph, pivot.row, column, node) for column, node in row.items()}
+    values = {column: sizes.value(graph, pivot.row, column, node) for column, node in row.items()}
+    divisor = values[pivot.column]
+    least = (own[pivot.column] if math.isnan(divisor) else abs(divisor)) or 1.0
     for other, entries in matrix.items():
         if pivot.column not in entries:
             continue
-        factor = graph.div(entries.pop(pivot.column), row[pivot.column])
+        node = entries.pop(pivot.column)
+        part = sizes.of(graph, other, pivot.column, node) / least
+        share = sizes.value(graph, other, pivot.column, node) / (divisor or math.nan)
+        factor = graph.div(node, row[pivot.column])
         for column, node in row.items():
             if column == pivot.column:
                 continue
-            change = graph.mul(factor, node)
-            updated = graph.sub(entries[column], change) if column in entries else graph.neg(change)
-            entries[column] = updated
-            if graph.value_of(updated) == 0:
-                del entries[column]
+            size = part * own[column]
+            value = -share * values[column]
+            updated = graph.mul(factor, node)
+            if column in entries:
+                size += sizes.of(graph, other, column, entries[column])
+                value += sizes.value(graph, other, column, entries[column])
+                updated = graph.sub(entries[column], updated)
+            else:
+                updated = graph.neg(updated)
+            left = sizes.number(graph, column, updated)
+            if left is not None and left <= NOISE * size:
+                entries.pop(column, None)
+                continue
+            entries[column], sizes.entries[other, column] = updated, size
+            sizes.values[other, column] = value
         right[other] = graph.sub(right[other], graph.mul(factor, right[pivot.row]))
     return row
 
 
-def _cheapest(graph: Graph, matrix: Matrix, any_pivot: bool) -> Pivot | None:
-    """Return the constant entry, or any, with the least fill (Markowitz), the first of equals."""
+def _cheapest(graph: Graph, matrix: Matrix, sizes: Sizes, any_pivot: bool) -> Pivot | None:
+    """Return the constant entry, or any, with the least fill (Markowitz), the first of equals.
+
+    A number that is small beside its row is no pivot, such as the 6e-17 of cos(pi/2). Of entries
+    that vary those that are small come last, and so does what cancels, such as r_1 - r_3 / 3 of
+    radii 0.1 and 0.3.
+    """
     in_column: dict[int, int] = {}
     for entries in matrix.values():
         for column in entries:
             in_column[column] = in_column.get(column, 0) + 1
-    best: tuple[int, int, int] | None = None
+    best: tuple[bool, int, int, int] | None = None
     for row, entries in matrix.items():
-        numbers = {column: graph.value_of(node) for column, node in entries.items()}
-        sizes = {column: abs(float(x)) for column, x in numbers.items() if x is not None}
-        least = SAFE * max(sizes.values(), default=0.0)
-        for column in entries:
-            # A number such as cos(pi/2) = 6e-17 is no pivot.
-            if not any_pivot and not sizes.get(column, -1.0) >= least:
+        own = {column: sizes.of(graph, row, column, node) for column, node in entries.items()}
+        least = SAFE * max(own.values(), default=0.0)
+        for column, node in entries.items():
+            value = sizes.value(graph, row, column, node)
+            is_safe = (own[column] if math.isnan(value) else abs(value)) >= least
+            if not any_pivot and not (is_safe and graph.value_of(node) is not None):
                 continue
-            rank = ((len(entries) - 1) * (in_column[column] - 1), row, column)
+            rank = (not is_safe, (len(entries) - 1) * (in_column[column] - 1), row, column)
             if best is None or rank < best:
                 best = rank
-    return None if best is None else Pivot(best[1], best[2])
+    return None if best is None else Pivot(*best[2:])
 
 
 def _solve_block(
@@ -324,16 +430,37 @@ def _pivoted(graph: Graph, a: list[list[int]], b: list[int]) -> tuple[list[int],
 
 
 def _eliminate_block(
-    graph: Graph, block: Block, matrix: Matrix, right: dict[int, int], solution: dict[int, int]
-) -> list[int]:
-    """Add the solution of a block to what is known; return its pivots, whatever varies in them."""
+    graph: Graph,
+    block: Block,
+    matrix: Matrix,
+    right: dict[int, int],
+    solution: dict[int, int],
+    sizes: Sizes,
+) -> tuple[list[int], Look]:
+    """Add the solution of a block to what is known.
+
+    Return its pivots, whatever varies in them, and the look at the solution for a right side
+    without a pattern: how far the same elimination may be trusted with others, and transposed.
+    """
     own = set(block.columns)
     part = {row: {k: x for k, x in matrix[row].items() if k in own} for row in block.rows}
     sides = {row: _remainder(graph, matrix[row], own, right[row], solution) for row in block.rows}
-    pivots, eliminated = _eliminate(graph, part, sides, any_pivot=True)
-    if not part:
-        substitute(graph, pivots, eliminated, sides, solution)
-    return [eliminated[pivot.row][pivot.column] for pivot in pivots]
+    known = replace(sizes, entries=dict(sizes.entries), values=dict(sizes.values))
+    whole, again = ({row: dict(entries) for row, entries in part.items()} for _ in range(2))
+    pivots, eliminated = _eliminate(graph, part, sides, sizes, any_pivot=True)
+    weights = known.weights()
+    shown = {
+        row: graph.const(part / weights.get(row, 1.0))
+        for row, part in zip(block.rows, reversed(parts_of(len(block.rows))), strict=True)
+    }
+    given, probed = dict(shown), dict[int, int]()
+    rows = {pivot.row: eliminate(graph, again, given, pivot, known) for pivot in pivots}
+    determinants = [eliminated[pivot.row][pivot.column] for pivot in pivots]
+    if part:  # structurally singular
+        return determinants, Look((), (), graph.const(0))
+    substitute(graph, pivots, eliminated, sides, solution)
+    substitute(graph, pivots, rows, given, probed)
+    return determinants, Look.at(graph, whole, shown, probed, weights)
 
 
 SAFE = 1e-3

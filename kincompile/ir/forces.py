@@ -28,6 +28,7 @@ from kincompile.ir.elimination import plan_solve
 from kincompile.ir.graph import Graph
 from kincompile.ir.implicit import DETERMINANT
 from kincompile.ir.kernels import KernelEnvironment, attributes
+from kincompile.ir.looks import MISSED
 from kincompile.ir.lower import Binder
 from kincompile.ir.observing import observing_program
 from kincompile.ir.program import Attribute
@@ -67,10 +68,11 @@ class _Row:
 def observing_forces(code: InlineProgram, *, is_planned: bool = True) -> Program | None:
     """Return a program without equations whose outputs are forces along a motion.
 
-    Where the multipliers are solved for, `is_planned`, these are determinants of the blocks of
-    Phi_q and the multipliers first; else the multipliers are further parameters. Then come forces
-    in the order of constraints, the force on the ground and what springs pull with. There are no
-    rates. None where there is no planned elimination.
+    Where the multipliers are solved for, `is_planned`, the part by which the solve misses its
+    equations, determinants of the blocks of Phi_q and the multipliers are first; else the
+    multipliers are further parameters. Then come forces in the order of constraints, the force on
+    the ground and what springs pull with. There are no rates. None where there is no planned
+    elimination.
     """
     program, graph = code.program, Graph(code.nodes)
     is_square = not program.redundant and not program.unsolvable
@@ -86,7 +88,8 @@ def observing_forces(code: InlineProgram, *, is_planned: bool = True) -> Program
     else:
         solve = StraightSolve(graph, code.entries("Phi_q"), plan)
         factors = solve.transposed(_sides(code, graph))
-        first = [_Row(DETERMINANT.format(k), "", x) for k, x in enumerate(solve.determinants)]
+        first = [_Row(MISSED, "", solve.missed())]
+        first += [_Row(DETERMINANT.format(k), "", x) for k, x in enumerate(solve.determinants)]
         first += [_Row(name, "", node) for name, node in zip(names, factors, strict=True)]
     rows = [*first, *_Forces(code, graph, factors).rows()]
     _check_names(program, [row.name for row in rows])
@@ -226,7 +229,7 @@ class _Forces:
         if len(joint.bodies) > 1:
             rows += zip([f"T_i{turn}" for turn in turns], numbers[size:each], strict=True)
         rows += zip(BY_AXIS[size], by_axis, strict=False)
-        has_value = "C" in joint.scalars
+        has_value = joint.has_value
         skipped = {self._graph.const(0), *([drive] if has_value else [])}
         for name, node in rows:
             if node not in skipped:

@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, TypeVar
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.elimination import plan_solve
 from kincompile.ir.graph import Graph
+from kincompile.ir.looks import MISSED
 from kincompile.ir.observing import observing_program
 from kincompile.ir.sensitive import check_names
 from kincompile.ir.straight_solve import StraightSolve
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 DETERMINANT = "determinant_of_block_{}"
-"""Names of the first outputs, which say where the elimination may be trusted."""
+"""Names of outputs before all others, which with `MISSED` say where elimination may be trusted."""
 
 
 def observing_sensitivities(
@@ -59,9 +60,9 @@ def observing_sensitivities(
     """Return a program without equations whose outputs are derivatives of a motion.
 
     They are those of the columns `of`, coordinates and outputs, by the parameters `names`, and of
-    `second` ones also by each pair of them, after the determinants or pivots of the blocks of
-    Phi_q; their rates are the derivatives of the rates. None where the equations are structurally
-    singular.
+    `second` ones also by each pair of them, after the part by which solves miss their equations and
+    the determinants or pivots of the blocks of Phi_q; their rates are the derivatives of the rates.
+    None where the equations are structurally singular.
     """
     check_names(code.program, names)
     plan = plan_solve(code, is_straight=True)
@@ -75,7 +76,7 @@ def observing_sensitivities(
     if second:
         found += system.second(found)
     nan = system.graph.nan()
-    rows = [(node, nan, nan) for node in system.determinants] + found
+    rows = [(node, nan, nan) for node in (system.missed(), *system.determinants)] + found
     outputs = {
         quantity: [nodes[order] for nodes in rows]
         for order, quantity in enumerate(TOGETHER["observe"])
@@ -98,7 +99,7 @@ def _titles(
     units = {item.name: item.unit for item in program.coordinates}
     units |= {item.name: item.unit for item in program.outputs}
     per = {item.name: item.unit for item in program.parameters}
-    found = [OutputColumn(DETERMINANT.format(k), "") for k in range(blocks)]
+    found = [OutputColumn(name, "") for name in (MISSED, *map(DETERMINANT.format, range(blocks)))]
     for parameters in by:
         for name in of:
             title, unit = name, units[name]
@@ -128,6 +129,11 @@ class _Linearized:
         self._solve = StraightSolve(graph, code.entries("Phi_q"), plan)
         self.determinants = self._solve.determinants
         self._directions: list[dict[int, int]] = []
+        self._missed: list[int] = []  # squares of the parts that second derivatives miss
+
+    def missed(self) -> int:
+        """Return by what part of their terms solutions miss their equations."""
+        return self._solve.missed(besides=self._missed)
 
     def _residuals(self, section: ConstraintRows) -> list[list[_Slopes]]:
         """Return the slopes of Phi, Phi_q q_dot - nu and Phi_q q_ddot - gamma, row by row."""
@@ -209,6 +215,9 @@ class _Linearized:
         """
         nan, slopes = self.graph.nan(), []
         size = len(found) // len(self._parameters)
+        looks = self._solve.looks()
+        for along in self._directions:
+            self._missed += [look.missed_along(self.graph, along) for look in looks]
         for first, direction in pairs_of(range(len(self._parameters))):
             for nodes in found[size * first : size * (first + 1)]:
                 own = tangents(self.graph, nodes, self._directions[direction])

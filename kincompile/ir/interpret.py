@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kincompile.ir.graph import pruned
 from kincompile.names import rate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from kincompile.ir.graph import Node
+    from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Instance, Kernel, Program
     from kincompile.model.spline import SplineTable
     from kincompile.quantities import Quantity
@@ -93,6 +95,29 @@ def inputs_of(program: Program, states: Sequence[Array], t: Any, p: Any) -> dict
         for column, item in enumerate(program.coordinates):
             inputs[rate(item.name, order)] = state[..., column]
     return inputs
+
+
+def evaluator(
+    code: InlineProgram, wanted: Sequence[str] = ("Phi", "Phi_q")
+) -> Callable[..., tuple[Array, ...]]:
+    """Return what gives the entries of quantities of a position alone, shape (entries, ...).
+
+    It is called with q, of shape (..., n), and if need be with t and p, as `interpret` is.
+    """
+    program, entries = code.program, [code.entries(quantity) for quantity in wanted]
+    nodes, number = pruned(code.nodes, [x.node for some in entries for x in some])
+    # NumPy's numbers: a division by zero is infinite, where Python's raises.
+    start, defaults = np.float64(0), np.array([x.default for x in program.parameters], dtype=float)
+
+    def evaluate(q: Array, t: Any = start, p: Array = defaults) -> tuple[Array, ...]:
+        values = run(nodes, inputs_of(program, (q, np.zeros_like(q)), t, p), program.tables)
+        shape = q.shape[:-1]
+        return tuple(
+            np.array([np.broadcast_to(values[number[x.node]], shape) for x in some])
+            for some in entries
+        )
+
+    return evaluate
 
 
 @dataclass(frozen=True, slots=True)

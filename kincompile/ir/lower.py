@@ -94,7 +94,10 @@ def _fingerprint(
     instances: list[Instance],
     tables: dict[str, SplineTable],
 ) -> str:
-    kernels = {instance.kernel.name: instance.kernel for instance in instances if instance.bodies}
+    kernels: dict[str, Kernel] = {}
+    for instance in instances:
+        if instance.bodies:
+            kernels.setdefault(instance.kernel.name, instance.kernel)
     first = {id(instance.kernel): instance.name for instance in reversed(instances)}
     content = (
         system.name,
@@ -106,7 +109,7 @@ def _fingerprint(
         [
             (
                 instance.name,
-                _kernel_mark(instance, first[id(instance.kernel)]),
+                _kernel_mark(instance, kernels, first[id(instance.kernel)]),
                 instance.bindings,
                 instance.columns,
             )
@@ -117,9 +120,12 @@ def _fingerprint(
     return hashlib.sha256(repr(content).encode()).hexdigest()[:32]
 
 
-def _kernel_mark(instance: Instance, first: str) -> Kernel | str:
-    """Return the name of a type; of a free equation the code, or the first that has the same."""
-    if instance.bodies:
+def _kernel_mark(instance: Instance, kernels: dict[str, Kernel], first: str) -> Kernel | str:
+    """Return the name of a type, where that says the code; else the code, or who has it first.
+
+    Free equations have code of their own, and so has an angle beside the driver of it.
+    """
+    if instance.bodies and kernels[instance.kernel.name] is instance.kernel:
         return instance.kernel.name
     return instance.kernel if first == instance.name else first
 

@@ -12,19 +12,21 @@ off the row, which is 2 p^T.
 Of the body-fixed directions one is chosen: the axis of a hinge, or the line between two points that
 are held. A turn about it moves nothing in some rows, so that larger blocks fall apart. It is found
 in Phi_q itself, at states drawn at random: the directions about which rows do not change, and which
-are the same in the body at all states.
+are the same in the body at all states. Its digits stand in emitted text, so they are computed by
+sums, products and roots one by one, which every processor rounds alike.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
+from functools import reduce
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.ir.graph import pruned
-from kincompile.ir.interpret import apply, inputs_of, run
+from kincompile.criteria import ZERO
+from kincompile.ir.interpret import apply, evaluator
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -40,8 +42,6 @@ if TYPE_CHECKING:
 STATES = 3
 """A direction that is the same at as many random states is the same at all."""
 SEED = 1988
-NOTHING = 1e-9
-"""Part of the size of its terms below which a sum is zero at a random state."""
 PARALLEL = 1e-3
 """Sine of the angle below which two directions give no third one."""
 
@@ -53,12 +53,9 @@ def sampled(code: InlineProgram) -> dict[str, Array]:
     defaults = np.array([item.default for item in program.parameters])
     spread = np.where(defaults == 0, 1.0, np.abs(defaults))[:, np.newaxis]
     p = defaults[:, np.newaxis] + random.uniform(0, 0.1, (len(defaults), STATES)) * spread
-    entries = code.entries("Phi_q")
-    nodes, number = pruned(code.nodes, [entry.node for entry in entries])
-    inputs = inputs_of(program, (q, np.zeros_like(q)), random.uniform(0, 1, STATES), p)
     with np.errstate(all="ignore"):
-        values = run(nodes, inputs, program.tables)
-    return {entry.name: values[number[entry.node]] for entry in entries}
+        (values,) = evaluator(code, ("Phi_q",))(q, random.uniform(0, 1, STATES), p)
+    return {entry.name: x for entry, x in zip(code.entries("Phi_q"), values, strict=True)}
 
 
 def small_rotations(
@@ -105,7 +102,7 @@ class Samples:
     def is_zero(self, node: int) -> bool:
         """Return whether a number vanishes at all states."""
         self._extend(node)
-        return bool(np.all(np.abs(self._values[node]) <= NOTHING * self._sizes[node]))
+        return bool(np.all(np.abs(self._values[node]) <= ZERO * self._sizes[node]))
 
     def _extend(self, node: int) -> None:
         for operation, *operands in self._graph.nodes[len(self._values) : node + 1]:
@@ -203,22 +200,23 @@ def _axes(
     """
     g = np.array([[samples.value(node) for node in row] for row in fixed])
     entries = np.array([[samples.value(node) for node in row] for row in rows])
-    derivatives = np.einsum("rpk,apk->kra", entries.reshape(-1, 4, STATES), g)
-    sizes = np.linalg.norm(derivatives, axis=-1, keepdims=True)
+    products = entries.reshape(-1, 1, 4, STATES) * g
+    derivatives = np.moveaxis(_total(np.moveaxis(products, 2, 0)), 2, 0)  # state, row, direction
+    sizes = _lengths(derivatives)
     if not np.isfinite(derivatives).all() or (sizes == 0).any():
         return np.eye(3)
     derivatives = derivatives / sizes
     best, most = None, (0, 1)
     for first, second in combinations(range(len(rows)), 2):
         h = np.cross(derivatives[:, first], derivatives[:, second])
-        length = np.linalg.norm(h, axis=1, keepdims=True)
+        length = _lengths(h)
         if (length < PARALLEL).any():
             continue
         h = h / length
         h = h * np.sign(h[:, np.argmax(np.abs(h[0]))])[:, np.newaxis]
-        if np.ptp(h, axis=0).max() > NOTHING:
+        if np.ptp(h, axis=0).max() > ZERO:
             continue
-        allow = (np.abs(derivatives @ h[0]) < NOTHING).all(axis=0)
+        allow = (np.abs(derivatives @ h[0]) < ZERO).all(axis=0)
         count = int((allow & is_own).sum()), int(allow.sum())
         if count > most:
             best, most = h[0], count
@@ -227,9 +225,19 @@ def _axes(
 
 def _beside(h: Array) -> Array:
     """Return two directions at right angles to a third, and that."""
-    h = np.where(np.abs(h) < NOTHING, 0.0, h)
-    h = h / np.linalg.norm(h)
+    h = np.where(np.abs(h) < ZERO, 0.0, h)
+    h = h / _lengths(h)
     near = np.eye(3)[np.argmin(np.abs(h))]
     g = np.cross(h, near)
-    g = g / np.linalg.norm(g)
+    g = g / _lengths(g)
     return np.array([np.cross(g, h), g, h])
+
+
+def _lengths(vectors: Array) -> Array:
+    """Return the lengths of vectors, (..., 3), as (..., 1)."""
+    return np.sqrt(_total(np.moveaxis(vectors * vectors, -1, 0)))[..., np.newaxis]
+
+
+def _total(terms: Array) -> Array:
+    """Return the sum over the first axis, term by term."""
+    return np.asarray(reduce(np.add, terms))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,24 +11,35 @@ import numpy as np
 from kincompile.criteria import turning
 from kincompile.errors import StructuralError
 from kincompile.ir.interpret import interpret
+from kincompile.ir.lower import lower
 from kincompile.model.resolve import Joint
-from kincompile.names import listed
+from kincompile.names import listed, rate
 from kincompile.structure.choice import rows_left_out
 from kincompile.structure.counting import counting_problem
-from kincompile.structure.rank import RankReport, generic_rank
-from kincompile.structure.remedies import least_squares_will_do, surpluses
+from kincompile.structure.rank import ANGLES_FIRST, RankReport, drivers_of, generic_rank
+from kincompile.structure.remedies import (
+    MissingDriver,
+    advice,
+    least_squares_will_do,
+    rank_problem,
+    surpluses,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from kincompile.ir.program import Program
+    from kincompile.model.constraint import Constraint
     from kincompile.model.resolve import FreeEquation
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.counting import Pattern
     from kincompile.structure.rank import Evaluate
     from kincompile.structure.remedies import Surplus
+
+HALF_TURN = 0.1
+"""e0 of an orientation so near to half a turn that no AbsoluteOrientation should begin there."""
 
 
 def rank_report(
@@ -39,7 +52,7 @@ def rank_report(
     return generic_rank(
         _evaluation(program),
         np.array([item.guess for item in system.coordinates]) if guess is None else guess,
-        np.array(turning((item.unit for item in system.coordinates), system.body_columns)),
+        _angular(system),
         driver_rows(system),
         _rows(system, lambda item: isinstance(item, Joint) and item.written.is_own),
         float(system.end),
@@ -93,13 +106,124 @@ def redundant_equations(
         rows = rows_left_out(_evaluation(program), report, float(system.end), joints)
         left_out = tuple(system.equations[row] for row in rows)
         return left_out, _warning(system, found, left_out), ""
+    if report.motions.size:
+        sentences = [rank_problem(system, report), advice(missing_drivers(system, report))]
+        sentences += [f"{item.text}; {item.remedy}" for item in found]
+        return (), "", ". ".join(sentences)
     names = [name for item in found for name in item.equations]
     sentences = [counting_problem(system, pattern, names)]
     sentences += [f"{item.text}; {item.remedy}" for item in found]
-    if report.free:
-        free = [system.coordinates[column].name for column in report.free]
-        sentences.append(f"at assembled positions {listed(free)} may still move")
     return (), "", ". ".join(sentences)
+
+
+def undriven(system: ConstraintSystem, program: Program) -> str:
+    """Return which drivers are missing though there are equations enough; "" if none are."""
+    missing = missing_drivers(system, rank_report(system, program))
+    return f"{advice(missing)}." if missing else ""
+
+
+def missing_drivers(system: ConstraintSystem, ranks: RankReport) -> tuple[MissingDriver, ...]:
+    """Return a driver for each degree of freedom: with all of them, nothing may move by itself.
+
+    At joints that have drivers of their own first, then of bodies and coordinates.
+    """
+    if not len(ranks.motions):
+        return ()
+    pairs = [
+        (item, driver)
+        for item in system.constraints
+        if isinstance(item, Joint)
+        for driver in item.written.drivers(item.points)
+    ]
+    rates, weights = _rates(system, [driver for _, driver in pairs], ranks)
+    taken, left = drivers_of(ranks.motions, rates, weights)
+    found = [_driver_at(*pairs[k]) for k in taken]
+    singly = _of_bodies(system, ranks)
+    rows = np.array([row for _, row, _ in singly])
+    chosen, _ = drivers_of(left, rows, np.array([weight for *_, weight in singly]))
+    return (*found, *_together(system, [singly[k][0] for k in sorted(chosen)], ranks))
+
+
+def _of_bodies(
+    system: ConstraintSystem, ranks: RankReport
+) -> list[tuple[MissingDriver, NDArray[Any], float]]:
+    """Return a driver of each freedom of bodies and coordinates, its row in scales, its weight.
+
+    A body in space turns about the axes of the ground; its Euler parameters have no drivers.
+    """
+    unit, weights = np.eye(ranks.scale.size), np.where(_angular(system), ANGLES_FIRST, 1.0)
+    values = {x.name: value for x, value in zip(system.coordinates, ranks.state[0][0], strict=True)}
+    found = []
+    for body, columns in zip(system.bodies, system.body_columns, strict=True):
+        for kind, column in zip(body.kind.drivers, columns, strict=True):
+            if kind != body.kind.turning[0]:
+                found.append((MissingDriver(kind, body.name), unit[column], weights[column]))
+        for axis, (_, spin, _) in zip("xyz", body.on_request, strict=False):
+            row = sum(
+                float(spin.diff(rate(name)).evalf(subs=values)) * unit[column]
+                for name, column in zip(body.coordinates, columns, strict=True)
+            )
+            driver = MissingDriver(body.kind.turning[1], body.name, axis=axis)
+            found.append((driver, row / np.linalg.norm(row), ANGLES_FIRST))
+    first = sum(map(len, system.body_columns))
+    for name, row, weight in zip(list(values)[first:], unit[first:], weights[first:], strict=True):
+        found.append((MissingDriver("Equation", name), row, weight))
+    return found
+
+
+def _together(
+    system: ConstraintSystem, drivers: Sequence[MissingDriver], ranks: RankReport
+) -> Iterator[MissingDriver]:
+    """Return drivers of bodies as they are said: three turns of one body are its orientation.
+
+    That is singular at half a turn. One turn about the line through two ball joints needs no
+    driver, but a joint fewer.
+    """
+    turns = Counter(item.drives for item in drivers if item.axis)
+    start = dict(zip((x.name for x in system.coordinates), ranks.nearest, strict=True))
+    whole, _, ball, joint = system.ground.kind.turning
+    for item in drivers:
+        balls = [
+            other.name
+            for other in system.constraints
+            if isinstance(other, Joint)
+            and other.type_name == ball
+            and item.drives in (body.name for body in other.bodies)
+        ]
+        if not item.axis:
+            yield item
+        elif turns[item.drives] == len("xyz") and abs(start[f"e0_{item.drives}"]) > HALF_TURN:
+            yield MissingDriver(whole, item.drives)
+        elif balls and turns[item.drives] == 1:
+            yield replace(item, instead=f"a {joint} in place of the {ball} {balls[0]}")
+        else:
+            yield item
+
+
+def _angular(system: ConstraintSystem) -> NDArray[np.bool_]:
+    """Return which coordinates have the scale of angles."""
+    return np.array(turning((item.unit for item in system.coordinates), system.body_columns))
+
+
+def _driver_at(joint: Joint, driver: Constraint) -> MissingDriver:
+    """Return a driver of a joint, of the one of its bodies that is not the ground."""
+    moved = [body.name for body in joint.bodies if not body.is_ground]
+    return MissingDriver(type(driver).__name__, moved[-1], joint.name)
+
+
+def _rates(
+    system: ConstraintSystem, drivers: Sequence[Constraint], ranks: RankReport
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the rows that drivers would add to Phi_q, (k, n), of length one in scales; weights."""
+    if not drivers:
+        return np.zeros((0, ranks.scale.size)), np.zeros(0)
+    _, Phi_q = _evaluation(lower(system.constrained_by(drivers)))(*ranks.state)
+    rows = Phi_q[0, -len(drivers) :] * ranks.scale
+    angles = [any(x.unit == "rad" for x in item.arguments().values()) for item in drivers]
+    return (
+        rows / np.linalg.norm(rows, axis=1, keepdims=True),
+        np.where(angles, ANGLES_FIRST, 1.0),
+    )
 
 
 def independence(

@@ -6,6 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from kincompile.ir.graph import depending_on
+from kincompile.ir.looks import root_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from kincompile.ir.elimination import SolvePlan
     from kincompile.ir.graph import Graph, Node
     from kincompile.ir.inline import Entry
+    from kincompile.ir.looks import Look
 
 
 class StraightSolve:
@@ -38,6 +40,19 @@ class StraightSolve:
         """Return x of A x = b."""
         new = self._planned(right)
         return [new[node] for node in self._plan.solution]
+
+    def looks(self, right: Sequence[int] | None = None) -> list[Look]:
+        """Return the looks at a solve; those of Phi_q have a right side of their own."""
+        new = self._solved if right is None else self._planned(right)
+        return [look.within(new) for look in self._plan.looks]
+
+    def missed(self, right: Sequence[int] | None = None, besides: Sequence[int] = ()) -> int:
+        """Return by what part of their terms equations are missed.
+
+        Squares of what derivatives of them miss may be added.
+        """
+        own = (look.missed(self._graph) for look in self.looks(right))
+        return root_of(self._graph, (*own, *besides))
 
     def transposed(self, sides: Sequence[int]) -> list[int]:
         """Return x of A^T x = b: the plan, linear in its right side, from its end to its start.

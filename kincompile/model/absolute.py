@@ -60,6 +60,7 @@ class AbsoluteAngle(Constraint):
     """The angle of a body is C."""
 
     source = "Haug 3.2.6"
+    sets_motion = True
     known_as = "motor, crank drive, rotary driver, prescribed angle"
     positive = (
         "C is counted counterclockwise from the x axis of the ground to the body's xi axis. "

@@ -31,6 +31,9 @@ class BodyKind:
     elsewhere: Mapping[str, str]
     # The module that makes a load of a body's mass; loaded where a body has one.
     masses: str = "kincompile.model.masses"
+    # Names of the types that drive all turning of a body, and one turn of it; of a ball joint, and
+    # of the joint that holds the spin which two ball joints leave.
+    turning: tuple[str, str, str, str] = ("", "", "", "")
 
     @property
     def ground(self) -> tuple[int, ...]:

@@ -129,7 +129,7 @@ class Element(Shown):
 
 @dataclass(frozen=True, repr=False)
 class Constraint(Element):
-    """A joint, or a driver where its value is a function of `t`. Every type is a subclass.
+    """A joint, or a driver; see `Joint.is_driver`. Every type is a subclass.
 
     A subclass declares its attributes as fields, in the book's order, and its Phi in vectors.
     Phi_q, nu and gamma follow by differentiation. The types that come with the package are in
@@ -138,6 +138,11 @@ class Constraint(Element):
 
     corners: bool = field(default=False, kw_only=True)
 
+    sets_motion: ClassVar[bool] = False
+    """Whether its value is an angle or a stroke that a motor sets: given by parameters alone, it is
+    a driver too, where another value is a dimension."""
+    driven_by: ClassVar[type[Constraint] | None] = None
+    """A type of driver: beside one of the same bodies and directions `beside_driver` holds."""
     row_names: ClassVar[tuple[str, ...]] = ()
     """Names of the equations where there is more than one."""
     simpler: ClassVar[tuple[tuple[str, type[Constraint]], ...]] = ()
@@ -184,9 +189,25 @@ class Constraint(Element):
         return Template(cls.__name__, cls.frames(), cls.contacts, cls.Phi())
 
     @classmethod
+    @cache
+    def driven_template(cls) -> Template:
+        """Return the template of this type beside a driver, made once."""
+        return Template(cls.__name__, cls.frames(), cls.contacts, cls.beside_driver())
+
+    @staticmethod
+    def beside_driver() -> tuple[Expression, ...]:
+        """Return the constraint in vectors beside a driver of type `driven_by`, with its C."""
+        raise NotImplementedError
+
+    @classmethod
     def keeping_others(cls, lost: Sequence[str]) -> type[Constraint] | None:
         """Return the type that keeps its equations but those rows, where there is one."""
         return next((other for row, other in cls.simpler if [row] == list(lost)), None)
+
+    def drivers(self, points: Mapping[str, tuple[Scalar, ...]]) -> tuple[Constraint, ...]:
+        """Return drivers of the freedoms that it leaves, of value 0, given its resolved points."""
+        del points
+        return ()
 
     @classmethod
     def equations_of(cls, name: str) -> tuple[str, ...]:
@@ -220,7 +241,7 @@ class Constraint(Element):
             contacts = _listed(what, cls.contacts_of("name"))
             start = "Where Newton's method begins [rad], 0 if not given"
             entries["guess"] = f"{start}; the {contacts}."
-        corners = "Of a driver, whether its velocity may jump; see docs/motion_laws.md."
+        corners = "Of a driver, whether its velocity may jump: no acceleration is given there."
         return entries | {"corners": corners}
 
 

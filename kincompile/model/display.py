@@ -45,5 +45,5 @@ def equations_latex(Phi: sympy.ImmutableDenseMatrix) -> str | None:
 
 
 def _kind(item: Joint | FreeEquation) -> str:
-    kind = "Equation" if isinstance(item, FreeEquation) else item.template.type_name
+    kind = "Equation" if isinstance(item, FreeEquation) else item.type_name
     return f"{kind} (driver)" if item.is_driver else kind

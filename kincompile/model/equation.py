@@ -22,7 +22,7 @@ class Equation:
     *expressions
         SymPy expressions, or `sympy.Eq`, in coordinates, parameters and `t`.
     corners
-        Whether their slope over time may jump; see docs/motion_laws.md.
+        Whether their slope over time may jump: no acceleration is given there.
     """
 
     name: str

@@ -27,6 +27,10 @@ from kincompile.names import listed, suggestion
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
+CALCULATED = mpmath.MPContext()  # type: ignore[attr-defined,no-untyped-call]
+"""Functions of floats for numbers that stand in emitted text. Their digits are the same on every
+processor, which those of `math` are not, and whatever precision mpmath is set to."""
+
 t = sympy.Symbol("t")
 """Time. The same symbol as `sympy.physics.mechanics.dynamicsymbols._t`."""
 

@@ -79,6 +79,7 @@ class TranslationalDistance(PointAndAxis):
     """A point on body j is at C along an axis of body i, counted from a point on the axis."""
 
     source = "Haug 3.5"
+    sets_motion = True
     known_as = "stroke, linear drive, piston drive, cylinder in a telescope"
     positive = "C counts along axis_i, from point_i."
     use = (

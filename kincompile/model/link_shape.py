@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import sympy
 
-from kincompile.model.expressions import Scalar, as_sympy, evaluate
+from kincompile.model.expressions import CALCULATED, Scalar, as_sympy, evaluate
 from kincompile.names import listed
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def drawn_distance(link: Outline, one: str, other: str) -> Scalar:
 def drawn_angle(link: Outline, one: str, other: str) -> float:
     """Return the direction from one joint to another in the drawing [rad]."""
     x, y = (number(item, link.values) for item in _from_to(link, one, other))
-    return math.atan2(y, x)
+    return float(CALCULATED.atan2(y, x))
 
 
 def _from_to(link: Outline, one: str, other: str) -> Point:

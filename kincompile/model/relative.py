@@ -67,6 +67,7 @@ class RelativeAngle(Constraint):
     """The angle of body j relative to body i is C."""
 
     source = "Haug 3.3"
+    sets_motion = True
     known_as = (
         "weld (with a Revolute), fixed (with a Revolute), rotary actuator, robot joint drive, "
         "prescribed relative angle"

@@ -5,7 +5,7 @@ Every problem is collected, none is raised.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any, cast
 
@@ -34,7 +34,7 @@ from kincompile.model.spline import PeriodicSpline, fit
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from kincompile.calculus.template import Template
     from kincompile.model.arguments import Argument
@@ -63,6 +63,11 @@ class Joint:
         return self.written.name
 
     @property
+    def type_name(self) -> str:
+        """Name of its type."""
+        return type(self.written).__name__
+
+    @property
     def equation_names(self) -> tuple[str, ...]:
         """Names of its rows."""
         return self.written.equation_names
@@ -83,9 +88,15 @@ class Joint:
         return self.written.corners
 
     @property
+    def has_value(self) -> bool:
+        """Whether it has a value C(t) of its own."""
+        return any(item.symbol == "C" for item in self.written.arguments().values())
+
+    @property
     def is_driver(self) -> bool:
-        """Whether its value is a function of time."""
-        return depends_on(self.scalars.get("C", 0), ("t",))
+        """Whether its value is a function of time, or an angle or a stroke given by parameters."""
+        names = symbol_names(self.scalars["C"]) if self.has_value else ()
+        return "t" in names or (self.written.sets_motion and bool(names))
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,6 +201,18 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
         profiles,
         (*(name for body in known for name in scope.columns[body.name]), *constraint.contact_names),
     )
+
+
+def beside(joint: Joint, joints: Sequence[Joint]) -> Joint:
+    """Return a joint as it holds beside the driver of its angle, if one of `joints` is that."""
+    kind = joint.written.driven_by
+    for item in joints:
+        if kind is None or not isinstance(item.written, kind) or item.bodies != joint.bodies:
+            continue
+        if item.points.items() <= joint.points.items():
+            scalars = {**joint.scalars, "C": item.scalars["C"]}
+            return replace(joint, template=joint.written.driven_template(), scalars=scalars)
+    return joint
 
 
 _WHERE = {2: "in the plane", 3: "in space"}

@@ -8,7 +8,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from kincompile.model.bodies import Body, default_values
-from kincompile.model.expressions import NotAnExpressionError, Scalar, as_expression
+from kincompile.model.expressions import (
+    CALCULATED,
+    NotAnExpressionError,
+    Scalar,
+    as_expression,
+)
 from kincompile.model.link_shape import Outline, listed_pairs, number, pairs_by_name
 from kincompile.names import listed, suggestion
 
@@ -35,7 +40,7 @@ class Link:
         """Return a vector of the drawing in the frame of the link."""
         if not self.angle:
             return vector
-        cosine, sine = math.cos(self.angle), math.sin(self.angle)
+        cosine, sine = float(CALCULATED.cos(self.angle)), float(CALCULATED.sin(self.angle))
         x, y = vector
         return x * cosine + y * sine, y * cosine - x * sine
 

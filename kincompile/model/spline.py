@@ -1,18 +1,29 @@
-"""A table of radii as a periodic quintic spline.
+"""A table of values as a quintic spline.
 
-It has four continuous derivatives, one more than a pair of cams needs.
+It has four continuous derivatives, one more than a pair of cams needs. Its slopes and curvatures at
+the points are those of the least integral of the third derivative squared. They are found by an
+elimination in plain floats: the coefficients stand in emitted text, and a library's elimination
+rounds as the processor at hand does.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import sympy
 
-DEGREE = 5
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+STIFFNESS = ((192, 36, 168, -24), (36, 9, 24, -3), (168, 24, 192, -36), (-24, -3, -36, 9))
+"""Of a piece of length 1: what slope and curvature at its two ends add to the jumps there."""
+
+RISE = (360, 60, 360, -60)
+"""And the same of its mean slope, on the right side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,20 +103,14 @@ def fit(angles: Any, radii: Any) -> SplineTable:
     ValueError
         If the table is not of this form; the message says which point is wrong.
     """
-    # SciPy's interpolation takes a quarter of a second to import, and only tables need it.
-    from scipy.interpolate import PPoly, make_interp_spline
-
     x, y = _numbers(angles), _numbers(radii)
     problem = _table_problem(x, y)
     if problem:
         raise ValueError(problem)
     if x[-1] - x[0] < 2 * np.pi - 1e-9:
         x, y = np.append(x, x[0] + 2 * np.pi), np.append(y, y[0])
-    pieces = PPoly.from_spline(make_interp_spline(x, y, k=DEGREE, bc_type="periodic"))
-    wide = np.diff(pieces.x) > 0
-    keep = wide & (pieces.x[:-1] >= x[0] - 1e-12) & (pieces.x[:-1] < x[-1] - 1e-12)
-    breaks = (*pieces.x[:-1][keep].tolist(), float(x[-1]))
-    return SplineTable(breaks, tuple(tuple(row) for row in pieces.c.T[keep].tolist()))
+    y[-1] = y[0]
+    return _spline(x.tolist(), y.tolist(), None)
 
 
 def fit_between(times: Any, values: Any, velocities: Any) -> SplineTable:
@@ -118,13 +123,68 @@ def fit_between(times: Any, values: Any, velocities: Any) -> SplineTable:
     velocities
         At the first time and at the last.
     """
-    from scipy.interpolate import PPoly, make_interp_spline
+    return _spline(list(map(float, times)), list(map(float, values)), velocities)
 
-    ends = tuple([(1, velocity), (2, 0.0)] for velocity in velocities)
-    pieces = PPoly.from_spline(make_interp_spline(times, values, k=DEGREE, bc_type=ends))
-    keep = np.diff(pieces.x) > 0
-    breaks = (*pieces.x[:-1][keep].tolist(), times[-1])
-    return SplineTable(breaks, tuple(map(tuple, pieces.c.T[keep].tolist())))
+
+def _spline(x: list[float], y: list[float], velocities: Sequence[float] | None) -> SplineTable:
+    """Return the quintic spline through points; without velocities at its ends it is periodic.
+
+    Slope and curvature at point k are unknowns 2 k and 2 k + 1. The jumps of the third and fourth
+    derivatives there, which are zero, have a matrix that is symmetric and positive definite, so
+    that it is eliminated without a choice of pivots.
+    """
+    last = len(x) - 1
+    points = [*range(last), 0 if velocities is None else last]
+    rows: list[dict[int, float]] = [{} for _ in range(2 * len(set(points)))]
+    right = [0.0] * len(rows)
+    for k, (i, j) in enumerate(pairwise(points)):
+        h = x[k + 1] - x[k]
+        slope, unknowns = (y[k + 1] - y[k]) / h, (2 * i, 2 * i + 1, 2 * j, 2 * j + 1)
+        for row, size, rise, numbers in zip(
+            unknowns, (h * h * h, h * h) * 2, RISE, STIFFNESS, strict=True
+        ):
+            right[row] += rise * slope / size
+            for column, number, power in zip(unknowns, numbers, (1.0, h, 1.0, h), strict=True):
+                rows[row][column] = rows[row].get(column, 0.0) + number * power / size
+    if velocities is not None:
+        for row, value in zip((0, 1, -2, -1), (velocities[0], 0, velocities[1], 0), strict=True):
+            rows[row], right[row] = {row % len(rows): 1.0}, float(value)
+    found = _solved(rows, right)
+    pieces = []
+    for k, (i, j) in enumerate(pairwise(points)):
+        h = x[k + 1] - x[k]
+        m, c = found[2 * i : 2 * i + 2]
+        value = (y[k + 1] - y[k]) / h - m - c * h / 2
+        slope, bend = found[2 * j] - m - c * h, (found[2 * j + 1] - c) * h
+        pieces.append((
+            (6 * value - 3 * slope + bend / 2) / (h * h * h * h),
+            (7 * slope - 15 * value - bend) / (h * h * h),
+            (10 * value - 4 * slope + bend / 2) / (h * h),
+            c / 2, m, y[k],
+        ))  # fmt: skip
+    return SplineTable(tuple(x), tuple(pieces))
+
+
+def _solved(rows: list[dict[int, float]], right: list[float]) -> list[float]:
+    """Solve equations, given by column, in which no pivot need be chosen."""
+    below: list[set[int]] = [set() for _ in rows]
+    for k, row in enumerate(rows):
+        for column in row:
+            below[column].add(k)
+    for k, pivot in enumerate(rows):
+        for j in sorted(item for item in below[k] if item > k):
+            factor = rows[j].pop(k) / pivot[k]
+            right[j] -= factor * right[k]
+            for column, number in pivot.items():
+                if column > k:
+                    rows[j][column] = rows[j].get(column, 0.0) - factor * number
+                    below[column].add(j)
+    for k in reversed(range(len(rows))):
+        for column, number in rows[k].items():
+            if column > k:
+                right[k] -= number * right[column]
+        right[k] /= rows[k][k]
+    return right
 
 
 def _numbers(values: Any) -> np.ndarray:

@@ -35,7 +35,7 @@ from kincompile.model.outputs import (
     resolved_observers,
 )
 from kincompile.model.points import BodyPoint, PlacedPoint
-from kincompile.model.resolve import FreeEquation, Joint, resolve_equation, resolve_joint
+from kincompile.model.resolve import FreeEquation, Joint, beside, resolve_equation, resolve_joint
 from kincompile.model.scope import Scope
 from kincompile.model.text_views import TextViews
 
@@ -194,9 +194,19 @@ class ConstraintSystem(MatrixViews, TextViews):
         scope = _scope(self.bodies, self.coordinates, self.parameters, [], self.ground)
         spins = [Output(*given) for body in self.bodies for given in body.on_request]
         observers = resolved_observers(points, spins, scope, self.length_unit)
-        values = {key: getattr(self, key) for key in self.__slots__}
+        return self._with({"body_points": tuple(points), "observers": observers, "loads": ()})
+
+    def constrained_by(self, more: Sequence[Constraint]) -> ConstraintSystem:
+        """Return the system with more constraints of known types, and no outputs and loads."""
+        scope = _scope(self.bodies, self.coordinates, self.parameters, [], self.ground)
+        constraints = (*self.constraints, *_resolved(list(more), scope))
+        names = tuple(name for item in constraints for name in item.equation_names)
+        changed = {"constraints": constraints, "equations": names, "observers": (), "loads": ()}
+        return self._with(changed)
+
+    def _with(self, changed: Mapping[str, Any]) -> ConstraintSystem:
         other = ConstraintSystem.__new__(ConstraintSystem)
-        _fill(other, {**values, "body_points": tuple(points), "observers": observers, "loads": ()})
+        _fill(other, {**{key: getattr(self, key) for key in self.__slots__}, **changed})
         return other
 
     def joint_points(self) -> tuple[BodyPoint, ...]:
@@ -299,4 +309,6 @@ def _resolved(
         resolve_equation(item, scope) if isinstance(item, Equation) else resolve_joint(item, scope)
         for item in written
     )
-    return tuple(item for item in found if item is not None)
+    known = [item for item in found if item is not None]
+    joints = [item for item in known if isinstance(item, Joint)]
+    return tuple(beside(item, joints) if isinstance(item, Joint) else item for item in known)

@@ -1,120 +1,242 @@
 """The safeguarded attempts to assemble many parameter sets, together: which are in vain.
 
-One set that cannot be assembled takes a hundred steps of `newton.safeguarded_step`. Here all sets
-take them side by side; one that comes anywhere near to holding its equations is left to
-`newton.assemble`, which alone decides what is found.
+One set that cannot be assembled takes a hundred of `corrector.safeguarded_step`. Here all sets take
+them side by side; one that comes anywhere near to holding its equations is left to
+`start.assemble`. Where the attempt from its guess leads shows on which branch that would end.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import BEND, LARGEST_ANGLE, RESTARTS, SHORTEST_STEP, SUFFICIENT
-from kincompile.runtime.newton import begins
-from kincompile.runtime.problem import weights_of
+from kincompile.criteria import (
+    BEND,
+    LARGEST_ANGLE,
+    MOST_MIRRORED,
+    NEAR_MISS,
+    SHORTEST_STEP,
+    SUFFICIENT,
+    probe_of,
+)
+from kincompile.runtime.engine.planned import Planned, stacked
+from kincompile.runtime.engine.scales import weights_of
+from kincompile.runtime.start import begins, mirrored
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.engine.code import Array, Code
     from kincompile.runtime.problem import Problem
 
     Mask = NDArray[np.bool_]
-
-NEAR_MISS = 1e-3
-"""What equations are missed by, relative to their terms, where they may hold after all."""
+    Places = NDArray[np.intp]
 
 
-def in_vain(
-    problems: Sequence[Problem], t: float, guesses: Sequence[Array], max_iterations: int
-) -> Mask:
-    """Say of which of N problems no safeguarded attempt from its guess comes near a position."""
-    found = np.ones(len(problems), dtype=bool)
-    block = max(1, MOST_NUMBERS // max(item.place.size**2 for item in problems)) if problems else 1
-    for first in range(0, len(problems), block):
-        for number in range(RESTARTS + 1):
-            left = first + np.flatnonzero(found[first : first + block])
-            if left.size:
-                some = [problems[k] for k in left.tolist()]
-                q = np.array([begins(problems[k], guesses[k])[number] for k in left.tolist()])
-                found[left] = _Attempts(some, t).miss(q, max_iterations)
+def safeguarded(
+    equations: Problem, sets: Array, t: float | Array, guesses: Array, max_iterations: int
+) -> Array:
+    """Return where safeguarded attempts from N guesses (N, n), with parameters (N, k), come near.
+
+    That is (n, N), of each the first attempt that does, and NaN where none does: Newton's own steps
+    lead from there to the position, or nowhere. The scales of all are those of one set. The module
+    has a planned solve.
+    """
+    pattern, times = _pattern_of(equations.code), np.broadcast_to(t, len(sets))
+    found, left = np.full_like(guesses.T, np.nan), np.arange(len(sets))
+    most = max(1, MOST_NUMBERS // equations.place.size**2)
+    for begin in begins(equations, guesses):
+        for own in [left[k : k + most] for k in range(0, left.size, most)]:
+            q = begin[own].T.copy()
+            attempts = _Attempts(equations, pattern, sets[own].T.copy(), times[own], q)
+            far = attempts.miss(q, max_iterations)
+            found[:, own[~far]] = q[:, ~far]
+        left = np.flatnonzero(np.isnan(found[0]))
     return found
 
+
+def other_sides(equations: Problem, sets: Array, t: float, q: Array) -> Array:
+    """Return `start.other_side` of N positions (n, N), with parameters (N, k)."""
+    n, pattern = len(q), _pattern_of(equations.code)
+    found = np.full_like(q, np.nan)
+    some, most = np.flatnonzero(np.isfinite(q).all(axis=0)), max(1, MOST_NUMBERS // n**2)
+    for first in range(0, some.size if n <= MOST_MIRRORED else 0, most):
+        own = some[first : first + most]
+        here, p = q[:, own], sets[own]
+        attempts = _Attempts(equations, pattern, p.T.copy(), np.full(len(p), t), here)
+        found[:, own] = mirrored(equations, here.T, attempts.matrices(here.T), attempts.matrices).T
+    return found
+
+
+PATIENT, FALLING = 3, 0.9
+"""Over so many steps a residual must fall to this part of itself: else it is at a minimum, around
+which it goes to and fro."""
+
+STATIONARY = 0.1
+"""Part of itself by which the square of a residual falls at least, if equations are linear: less
+only at a minimum, far from holding them. Where they can hold it is nearly all."""
 
 WILD = 1e100
 """Entry of Phi_q with whose square nothing can be solved."""
 
-MOST_NUMBERS = 1_000_000
+MOST_NUMBERS = 250_000
 """Numbers of the matrices that are taken at a time."""
 
 
-class _Attempts:
-    """What `newton.safeguarded_step` reads, of N problems: arrays (N, n) and (N, m)."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pattern:
+    """Where the entries of Phi_q are, and in which order its normal equations are eliminated."""
 
-    def __init__(self, problems: Sequence[Problem], t: float) -> None:
-        self._code, self._t = problems[0].code, t
-        self._p = np.array([item.p for item in problems])
-        self._reference = np.array([item.reference for item in problems])
-        self._magnitude = np.array([item.magnitude for item in problems])
-        shape = self._magnitude.shape
-        self._limit = np.array([np.broadcast_to(item.limit, shape[1]) for item in problems])
-        self._most = self._reference * np.where(self._code.angular, LARGEST_ANGLE, 1.0)
+    rows: Places  # (nnz,)
+    columns: Places
+    numbers: Array  # (nnz,): what never changes; NaN where it varies
+    # Of each row its entries, their columns, and the places of these in a matrix.
+    by_row: list[tuple[Places, Places, tuple[Places, ...]]]
+    # Each pivot, the columns that it is coupled with then, and their places in a matrix.
+    order: list[tuple[int, Places, tuple[Places, ...]]]
+
+
+def _pattern_of(code: Code) -> _Pattern:
+    """Return the pattern of a module: eliminated first is what is coupled with fewest others."""
+    rows, columns, numbers = (np.array(x) for x in zip(*code.entries, strict=True))
+    own = _Pattern(rows, columns, numbers.astype(np.float64), [], [])
+    coupled: dict[int, set[int]] = {column: set() for column in range(len(code.coordinates))}
+    for row in range(len(code.equations)):
+        entries = np.flatnonzero(rows == row)
+        among = columns[entries]
+        own.by_row.append((entries, among, np.ix_(among, among)))
+        for column in among.tolist():
+            coupled[column].update(among.tolist())
+    while coupled:
+        pivot = min(coupled, key=lambda column: len(coupled[column]))
+        others = coupled.pop(pivot) - {pivot}
+        for column in others:
+            coupled[column] = (coupled[column] | others) - {pivot}
+        places = np.array(sorted(others), dtype=np.intp)
+        own.order.append((pivot, places, np.ix_(places, places)))
+    return own
+
+
+class _Attempts:
+    """What `corrector.safeguarded_step` reads, of N problems: arrays (n, N) and (m, N)."""
+
+    def __init__(
+        self, equations: Problem, pattern: _Pattern, sets: Array, t: Array, q: Array
+    ) -> None:
+        self._code, self._pattern, self._t, self._p = equations.code, pattern, t, sets
+        self._reference = equations.reference[:, np.newaxis]
+        self._limit = np.broadcast_to(equations.limit, len(pattern.by_row))[:, np.newaxis]
+        self._most = self._reference * np.where(self._code.angular, LARGEST_ANGLE, 1.0)[:, None]
+        self._scales = self._reference[pattern.columns]
+        # (m, nnz): adds up what the entries of each row contribute.
+        self._add = (np.arange(self._limit.size)[:, None] == pattern.rows) * self._scales.T
+        generic = q + self._reference * probe_of(len(q))[:, np.newaxis]
+        terms = self._add @ np.abs(self._evaluate(generic, np.arange(t.size))[1])
+        self._magnitude = np.where(np.isfinite(terms), terms, equations.magnitude[:, np.newaxis])
+
+    def _evaluate(self, q: Array, which: Places) -> tuple[Array, Array]:
+        """Return Phi (m, N) and the entries of Phi_q (nnz, N) of some problems."""
+        varies = np.isnan(self._pattern.numbers)
+        point = Planned(self._code, self._p[:, which]).evaluate(q, self._t[which])
+        entries = np.repeat(self._pattern.numbers[:, np.newaxis], which.size, axis=1)
+        entries[varies] = stacked(point.Phi_q, which.size)
+        return stacked(point.Phi, which.size), entries
+
+    def matrices(self, q: Array) -> Array:
+        """Return Phi_q, (N, m, n), of all problems at positions (N, n)."""
+        found = np.zeros((len(q), len(self._pattern.by_row), q.shape[1]))
+        entries = self._evaluate(q.T, np.arange(len(q)))[1]
+        found[:, self._pattern.rows, self._pattern.columns] = entries.T
+        return found
 
     def miss(self, q: Array, max_iterations: int) -> Mask:
-        """Say which attempts from positions (N, n) stay far from holding the equations."""
-        far = np.ones(len(q), dtype=bool)
-        moving = np.arange(len(q))
+        """Say which sets the attempts from positions (n, N) bring nowhere near to being assembled.
+
+        The positions become those that were reached.
+        """
+        far, moving = np.ones(q.shape[1], dtype=bool), np.arange(q.shape[1])
+        earlier = np.full((PATIENT, moving.size), np.inf)  # the last residuals of each
+        Phi, Phi_q = self._evaluate(q, moving)
         for _ in range(max_iterations):
+            sizes = np.abs(Phi_q)
+            terms = np.minimum(self._add @ sizes, self._limit)
+            weights = weights_of(np.maximum(self._magnitude[:, moving], terms))
+            residual = weights * Phi
+            before = _norms(residual)
+            known = (before > NEAR_MISS) & (sizes.max(axis=0) < WILD)
+            far[moving[~known]] = False
+            known &= before < FALLING * earlier[0, moving]
+            earlier[:, moving] = np.vstack((earlier[1:, moving], before))
+            entries = weights[self._pattern.rows] * Phi_q * self._scales
+            moving, weights, residual, before, entries = _some(
+                known, moving, weights, residual, before, entries
+            )
+            direction, falls = _directions(self._pattern, entries, residual, before)
+            sane = np.isfinite(falls)
+            far[moving[~sane]] = False
+            sane &= falls > STATIONARY
+            moving, direction, weights, before = _some(sane, moving, direction, weights, before)
             if not moving.size:
                 break
-            Phi, Phi_q = self._code.written(q[moving], self._t, self._p[moving])
-            reference = self._reference[moving]
-            terms = (np.abs(Phi_q) @ reference[..., np.newaxis])[..., 0]
-            terms = np.maximum(self._magnitude[moving], np.minimum(terms, self._limit[moving]))
-            weights = weights_of(terms)
-            before = _norms(weights * Phi)
-            known = (before > NEAR_MISS) & (np.abs(Phi_q) < WILD).all(axis=(1, 2))
-            far[moving[~known]] = False
-            moving, weights, before = moving[known], weights[known], before[known]
-            matrix = weights[..., np.newaxis] * Phi_q[known] * reference[known][:, np.newaxis]
-            correction = reference[known] * _directions(matrix, weights * Phi[known], before)
-            sane = np.isfinite(correction).all(axis=1)
-            far[moving[~sane]] = False
-            moving, correction = moving[sane], correction[sane]
-            moved = self._shortened(q, moving, correction, weights[sane], before[sane])
-            moving = moving[moved]
+            correction = self._reference * direction
+            moved, Phi, Phi_q = self._shortened(q, moving, correction, weights, before)
+            moving, Phi, Phi_q = _some(moved, moving, Phi, Phi_q)
         return far
 
     def _shortened(
-        self, q: Array, moving: NDArray[np.intp], correction: Array, weights: Array, before: Array
-    ) -> Mask:
-        """Apply as much of each correction as lowers the residual; say where any does."""
-        part = 1 / np.maximum((np.abs(correction) / self._most[moving]).max(axis=1), 1.0)
-        moved = np.zeros(moving.size, dtype=bool)
-        left = np.arange(moving.size)
+        self, q: Array, moving: Places, correction: Array, weights: Array, before: Array
+    ) -> tuple[Mask, Array, Array]:
+        """Apply as much of each correction as lowers the residual.
+
+        Returns where any does, and Phi and the entries of Phi_q there.
+        """
+        part = 1 / np.maximum((np.abs(correction) / self._most).max(axis=0), 1.0)
+        moved, left = np.zeros(moving.size, dtype=bool), np.arange(moving.size)
+        Phi, Phi_q = np.zeros((len(weights), left.size)), np.zeros((len(self._scales), left.size))
         while left.size:
-            trial = q[moving[left]] + part[left, np.newaxis] * correction[left]
-            Phi, _ = self._code.written(trial, self._t, self._p[moving[left]])
-            after = _norms(weights[left] * Phi)
+            trial = q[:, moving[left]] + part[left] * correction[:, left]
+            here = self._evaluate(trial, moving[left])
+            after = _norms(weights[:, left] * here[0])
             lower = after <= (1 - SUFFICIENT * part[left]) * before[left]
-            q[moving[left[lower]]], moved[left[lower]] = trial[lower], True
+            done = left[lower]
+            q[:, moving[done]], moved[done] = trial[:, lower], True
+            Phi[:, done], Phi_q[:, done] = here[0][:, lower], here[1][:, lower]
             part[left] /= 2
             left = left[~lower & (part[left] >= SHORTEST_STEP)]
-        return moved
+        return moved, Phi, Phi_q
 
 
-def _directions(matrix: Array, residual: Array, size: Array) -> Any:
-    """Return Levenberg's and Marquardt's directions, of residuals that are far from zero."""
-    turned = matrix.swapaxes(1, 2)
-    bend = BEND * np.minimum(1.0, size)
-    normal = turned @ matrix + bend[:, np.newaxis, np.newaxis] * np.eye(matrix.shape[2])
-    found: Any = -np.linalg.solve(normal, turned @ residual[..., np.newaxis])[..., 0]
-    return found
+def _directions(
+    pattern: _Pattern, entries: Array, residual: Array, size: Array
+) -> tuple[Array, Array]:
+    """Return Levenberg's and Marquardt's directions, of residuals that are far from zero.
+
+    And by which part of itself the square of each residual would fall, if equations were linear.
+    """
+    n = len(pattern.order)
+    normal, sides = np.zeros((n, n, size.size)), np.zeros((n, size.size))
+    for right, (own, columns, places) in zip(residual, pattern.by_row, strict=True):
+        values = entries[own]
+        normal[places] += values[:, np.newaxis] * values
+        sides[columns] -= values * right
+    normal[np.arange(n), np.arange(n)] += BEND * np.minimum(1.0, size)
+    found = sides.copy()
+    for pivot, others, places in pattern.order:
+        factors = normal[others, pivot] / normal[pivot, pivot]
+        normal[places] -= factors[:, np.newaxis] * normal[pivot, others]
+        found[others] -= factors * found[pivot]
+    for pivot, others, _ in reversed(pattern.order):
+        found[pivot] -= (normal[pivot, others] * found[others]).sum(axis=0)
+        found[pivot] /= normal[pivot, pivot]
+    return found, (found * sides).sum(axis=0) / size**2
 
 
-def _norms(rows: Array) -> Any:
-    return np.sqrt((rows * rows).sum(axis=1))
+def _some(which: Mask, *arrays: Any) -> Any:
+    """Return some columns of arrays; no copies of all of them."""
+    return arrays if which.all() else tuple(values[..., which] for values in arrays)
+
+
+def _norms(columns: Array) -> Any:
+    return np.sqrt((columns * columns).sum(axis=0))

@@ -83,6 +83,8 @@ def _format(module: ModuleType) -> Iterator[str]:
         yield "FORMAT is missing; a model is read by kc.read_model and compiled by kc.compile"
     elif (given := module.FORMAT) not in FORMATS:
         yield f"its FORMAT is {given!r} and this version reads {listed(FORMATS)}"
+    elif getattr(module, "FORM", None) == "grouped" and not hasattr(module, "BLOCKS"):
+        yield "it has no BLOCKS, which a module in grouped form is solved by"
 
 
 def _bodies(coordinates: object) -> tuple[tuple[str, int, int], ...]:

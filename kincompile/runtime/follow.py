@@ -10,12 +10,12 @@ import numpy as np
 
 from kincompile.criteria import OTHER_SIZE, RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
 from kincompile.names import listed
-from kincompile.runtime.engine.engine import Point, rates_agree
-from kincompile.runtime.engine.staged import Staged
+from kincompile.runtime.engine.dense import LARGEST_CAREFUL, Dense
+from kincompile.runtime.engine.scales import Point
+from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
-from kincompile.runtime.march import March, Outcome, State, distance
-from kincompile.runtime.newton import give_up, start
-from kincompile.runtime.problem import LARGEST_CAREFUL, Dense, problem
+from kincompile.runtime.march import March, Outcome, State
+from kincompile.runtime.problem import problem
 from kincompile.runtime.singular.events import (
     DOUBTS,
     branch_switch,
@@ -24,6 +24,7 @@ from kincompile.runtime.singular.events import (
     singular_start,
     status_after,
 )
+from kincompile.runtime.start import give_up, start
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Array
-    from kincompile.runtime.engine.engine import Engine
+    from kincompile.runtime.engine.linear import Linear
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.singular.events import Event, Passage
 
@@ -59,13 +60,14 @@ class Motion:
     # Points so near to a singular configuration that their rates are uncertain.
     near: list[int] = field(default_factory=list)
     note: str = ""  # a remark for the message of the solution
+    undriven: str = ""  # which drivers are missing, where equations depend on others everywhere
     is_folded: bool = False  # whether the guess shows no branch
 
     @classmethod
     def over(cls, inputs: Inputs) -> Motion:
         """Make the arrays for a time grid, with nothing reached."""
         points = inputs.t.size
-        if inputs.code.stages:
+        if inputs.code.blocks:
             q, q_dot, q_ddot = np.empty((3, points, inputs.guess.size))
         else:  # each coordinate contiguous in memory, as the code of a grid wants it
             q, q_dot, q_ddot = np.empty((3, inputs.guess.size, points)).transpose(0, 2, 1)
@@ -140,8 +142,8 @@ class _Way:
         inputs, time = self._inputs, float(self._times[0])
         self._march = self._march_at(inputs.guess, None)
         outcome = start(self._march, time, inputs)
-        if self._is_staged and outcome.state is None:
-            self._leave_stages(inputs.guess)
+        if self._is_sparse and outcome.state is None:
+            self._leave_blocks(inputs.guess)
             outcome = start(self._march, time, inputs)
         self._put(outcome)
         self._motion.is_folded = outcome.is_folded
@@ -177,9 +179,6 @@ class _Way:
         motion.put(0, outcome)
         if reached < inputs.t.size:
             return False
-        code = inputs.code
-        if code.redundant and not rates_agree(code, inputs.t, inputs.p, states).all():
-            return False
         motion.status[1:], motion.iterations[1:] = status[1:], iterations[1:]
         motion.statistics["compiled"] = inputs.t.size
         return True
@@ -206,7 +205,9 @@ class _Way:
             return None
         if state is None:
             if outcome.status is Status.SINGULAR and outcome.position is not None:
-                motion.events += filter(None, [singular_start(equations, outcome.position, t)])
+                motion.undriven = equations.code.undriven()
+                if not motion.undriven:
+                    motion.events += filter(None, [singular_start(equations, outcome.position, t)])
             return None
         # A rounding error before it a state is too near to say what it is: the point before is not.
         found = locate(self._march, state, t) or self._locate_from_point(t)
@@ -262,29 +263,29 @@ class _Way:
 
     def _count_pivoted(self) -> None:
         engine = self._march.engine
-        if isinstance(engine, Staged) and engine.pivoted:
+        if isinstance(engine, Sparse) and engine.pivoted:
             self._motion.statistics["pivoted"] = engine.pivoted
 
     @property
-    def _is_staged(self) -> bool:
-        """Whether the stages solve, and dense matrices may take over."""
-        return isinstance(self._march.engine, Staged) and self._may_be_dense
+    def _is_sparse(self) -> bool:
+        """Whether the blocks solve, and dense matrices may take over."""
+        return isinstance(self._march.engine, Sparse) and self._may_be_dense
 
     @property
     def _may_be_dense(self) -> bool:
         return not (
-            isinstance(self._march.engine, Staged) and self._inputs.guess.size > LARGEST_CAREFUL
+            isinstance(self._march.engine, Sparse) and self._inputs.guess.size > LARGEST_CAREFUL
         )
 
     def _march_at(
-        self, q: NDArray[np.float64], engine: Engine | None, t: float | None = None
+        self, q: NDArray[np.float64], engine: Linear | None, t: float | None = None
     ) -> March:
         """Return the march of the mechanism, whose scales are those at a position."""
         inputs, time = self._inputs, float(self._times[0]) if t is None else t
-        equations = problem(inputs.code.module, inputs.p, q, time, staged=True, engine=engine)
+        equations = problem(inputs.code.module, inputs.p, q, time, sparse=True, engine=engine)
         return March(equations, equations.engine, inputs.tolerance)
 
-    def _leave_stages(self, q: NDArray[np.float64]) -> None:
+    def _leave_blocks(self, q: NDArray[np.float64]) -> None:
         """Solve dense matrices from here on: they have the last word."""
         self._count_pivoted()
         self._march = self._march_at(q, Dense(self._inputs.code, self._inputs.p))
@@ -310,8 +311,8 @@ class _Way:
             again = self._advance(state)
             self._motion.iterations[self._index - 1] += outcome.iterations
             return again
-        if self._is_staged and doubtful and not outcome.exhausted:
-            self._leave_stages(state.point.q)
+        if self._is_sparse and doubtful and not outcome.exhausted:
+            self._leave_blocks(state.point.q)
             known = self._state(state.point.q, state.t)
             careful = known if known.state is None else self._advance(known.state)
             spent = careful.iterations + outcome.iterations
@@ -366,8 +367,8 @@ class _Way:
         motion, index = self._motion, self._index
         if motion.status[index - 1] == Status.CONVERGED and motion.statistics["marched"] == 0:
             return True
-        reference = self._march.equations.reference
-        return bool(distance(motion.q[index], state.point.q, reference) <= SMALL_ERROR)
+        away = self._march.equations.extent(motion.q[index] - state.point.q)
+        return bool(away <= SMALL_ERROR)
 
     def _take_up(self, count: int) -> Outcome:
         """Take so many points of the grid; return the last as one to go on from."""

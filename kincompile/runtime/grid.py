@@ -28,7 +28,6 @@ from kincompile.criteria import (
     SMALLEST_DETERMINANT,
     SMOOTH_UNSEEN,
 )
-from kincompile.runtime.engine.engine import rates_agree
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, largest
 
@@ -175,7 +174,7 @@ def _coarse_step(
     else:
         return None
     point.q = q
-    q_dot, q_ddot = engine.velocity_and_acceleration(point)
+    _, q_dot, _, q_ddot = engine.velocity_and_acceleration(point)
     determinants = point.factors[1]
     if not math.isfinite(sum(q_ddot)):
         return None
@@ -212,17 +211,12 @@ def _interpolate(nodes: list[_Node], times: Array, q: Array) -> None:
 
 def _solve_block(march: March, t: Array, result: GridResult, block: slice, smallest: Array) -> None:
     """Correct a block of interpolated positions twice, and solve for velocity and acceleration."""
-    engine, rates = march.engine, (result.q_dot[:, block], result.q_ddot[:, block])
+    engine, q_dot, q_ddot = march.engine, result.q_dot[:, block], result.q_ddot[:, block]
     assert isinstance(engine, Planned)
     found = march.correct_together(result.q[:, block], t, CORRECTIONS_ON_GRID, LARGEST_DISPLACEMENT)
     point, good = found.point, found.good
-    for rows, lanes in zip(rates, engine.velocity_and_acceleration(point), strict=True):
-        for row, lane in zip(rows, lanes, strict=True):
-            row[:] = lane
-    good = good & np.isfinite(sum(map(sum, rates)))
+    result.residual[block] = largest(point.Phi, t.size)
+    rates = engine.rates(point, None, (q_dot, q_ddot))
     for values, least in zip(point.factors[1], smallest, strict=True):
         good = good & (values / least > 1)
-    if engine.code.redundant:
-        good = good & rates_agree(engine.code, t, march.equations.p, (point.q, *rates))
-    result.residual[block] = largest(point.Phi, t.size)
-    result.good[block] = good
+    result.good[block] = good & engine.meet(march.equations, point, rates)

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from kincompile.criteria import LONGEST_P
 from kincompile.errors import InputError
-from kincompile.names import column_name, listed, suggestion
+from kincompile.names import LARGEST_SEED, column_name, listed, shown, suggestion
 from kincompile.runtime.engine.code import Code, code_of, require_square
 
 if TYPE_CHECKING:
@@ -41,9 +42,10 @@ def mapping_of(given: Any, what: str) -> Mapping[str, Any]:
 
 
 def require_seed(seed: Any) -> None:
-    """Check that a seed is a whole number that is not negative."""
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InputError(f"seed is {seed!r}: give a whole number of at least 0.")
+    """Check that a seed is a whole number that every generator of random numbers takes."""
+    is_whole = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
+    if not is_whole or not 0 <= seed <= LARGEST_SEED:
+        raise InputError(f"seed is {shown(seed)}: give a whole number from 0 to {LARGEST_SEED:,}.")
 
 
 SMALLEST_GRID = 32
@@ -188,6 +190,9 @@ def read_inputs(
     code = code_of(module)
     if not may_move:
         require_square(code)
+    if code.covers.size:
+        problems += _without_orientation(code, values[2])
+        values = *values[:2], _oriented(code, values[2]), *values[3:]
     if method == "grid" and code.lanes is None:
         problems.append(
             f"{code.name} goes from point to point, as all mechanisms in the grouped form do: use "
@@ -296,6 +301,31 @@ def real_numbers(what: str, given: object, problems: list[str]) -> NDArray[np.fl
         problems.append(f"{what} is {kind}: give real numbers.")
         return None
     return array.astype(np.float64)
+
+
+def _without_orientation(code: Code, guess: NDArray[np.float64]) -> list[str]:
+    """Return what is wrong with Euler parameters of length zero."""
+    bodies = {first + 3: name for name, first, _ in code.bodies}
+    return [
+        f"the guess of {bodies[int(p[0])]!r} has Euler parameters of length zero, which is no "
+        "orientation: (1, 0, 0, 0) is that of the ground."
+        for p in code.covers
+        if not guess[p].any()
+    ]
+
+
+def _oriented(code: Code, guess: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a guess with Euler parameters of a length near one: any length is an orientation.
+
+    By their largest first, since the squares of large ones overflow.
+    """
+    found = guess.copy()
+    for p in code.covers:
+        most = np.abs(guess[p]).max()
+        rest = math.sqrt(sum((guess[p] / most) ** 2)) if most else math.nan
+        if most * rest > LONGEST_P or most * rest < 1 / LONGEST_P:
+            found[p] = guess[p] / most / rest
+    return found
 
 
 def _require_finite(what: str, name: str, value: float, problems: list[str]) -> None:

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import linecache
 import zlib
-from functools import lru_cache, partial
+from functools import partial
 from importlib.util import decode_source
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from kincompile.errors import ContractError, InputError
@@ -21,13 +21,10 @@ from kincompile.runtime.results.html import module_html
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
     from typing import Any
 
     from numpy.typing import NDArray
-
-_SHARED = "\nclass _Quantity:\n"
-"""Where the text begins that emitted modules have in common: what calls the mechanism's code."""
 
 
 def load(path: str | os.PathLike[str]) -> ModuleType:
@@ -47,7 +44,7 @@ def load(path: str | os.PathLike[str]) -> ModuleType:
     Returns
     -------
     module
-        With the names of the contract in docs/contract.md.
+        With the constants and functions that every emitted module has.
 
     Raises
     ------
@@ -59,7 +56,7 @@ def load(path: str | os.PathLike[str]) -> ModuleType:
     file = Path(path)
     module = ModuleType(file.stem)
     text, name = _text(file), str(file.absolute())
-    return _fill(module, name, lambda: (compile(text, name, "exec"),))
+    return _fill(module, name, text)
 
 
 def from_source(
@@ -79,7 +76,7 @@ def from_source(
     module = ModuleType(name)
     if arrays:
         module.__dict__["ARRAYS_OF_COMPANION"] = dict(arrays)
-    return _fill(module, filename, lambda: _code(source, filename))
+    return _fill(module, filename, source)
 
 
 def _text(file: Path) -> str:
@@ -96,33 +93,11 @@ def _text(file: Path) -> str:
         raise ContractError(f"{file} is not the text of a Python module. {REMEDY}") from error
 
 
-def _code(source: str, filename: str) -> tuple[CodeType, ...]:
-    """Compile emitted text; what modules share only once: a four-bar takes 11 ms instead of 18."""
-    own, mark, shared = source.partition(_SHARED)
-    code = compile(own, filename, "exec")
-    return code, _moved(_compiled(mark + shared), filename, own.count("\n"))
-
-
-@lru_cache(maxsize=8)
-def _compiled(text: str) -> CodeType:
-    return compile(text, "", "exec")
-
-
-def _moved(code: CodeType, filename: str, lines: int) -> CodeType:
-    """Put code into another file, so many lines further down."""
-    inner = (_moved(x, filename, lines) if isinstance(x, CodeType) else x for x in code.co_consts)
-    first = code.co_firstlineno + lines
-    return code.replace(co_consts=tuple(inner), co_filename=filename, co_firstlineno=first)
-
-
-def _fill(
-    module: ModuleType, filename: str, compiled: Callable[[], tuple[CodeType, ...]]
-) -> ModuleType:
-    """Run a module's code in it and check the result."""
+def _fill(module: ModuleType, filename: str, source: str) -> ModuleType:
+    """Run a module's text in it and check the result."""
     module.__file__ = filename
     try:
-        for code in compiled():
-            exec(code, module.__dict__)
+        exec(compile(source, filename, "exec"), module.__dict__)
     except SyntaxError as error:
         raise ContractError(
             f"{filename} is not a Python module: {error.msg} in line {error.lineno}. {REMEDY}"

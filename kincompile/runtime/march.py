@@ -11,7 +11,6 @@ step is halved, and doubled again once it succeeds.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,9 +18,14 @@ import numpy as np
 
 from kincompile.criteria import (
     ALLOWED_PART,
+    BEFORE_LOCK_UP,
+    BEYOND,
+    GROWN,
     KINK,
     LARGE_ERROR,
     LAST_CORRECTION,
+    LEFT,
+    MAX_CORRECTIONS,
     MAX_SUBSTEPS,
     NEARLY_SINGULAR,
     PATIENCE,
@@ -31,20 +35,32 @@ from kincompile.criteria import (
     SMALL_ERROR,
     SMALLEST_PART,
     SMOOTH,
+    TINY,
     TOO_NEAR,
 )
-from kincompile.runtime.problem import Dense, column, unsolvable, within
+from kincompile.runtime.engine.dense import Dense, unsolvable
+from kincompile.runtime.engine.scales import Point, column, within
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from kincompile.runtime.engine.code import Array
-    from kincompile.runtime.engine.engine import Engine, Point
+    from kincompile.runtime.engine.linear import Linear
     from kincompile.runtime.problem import Problem
 
 SIGN_OF_LIFE = 256
 """Sub-steps between two times after which progress is shown."""
+
+CLOSE = 0.1
+"""Part of the largest sensitivity above which a step that fails is one towards a singularity."""
+
+GROWTH = 1.5
+"""By what a step of a batch is longer than the one before it."""
+
+BEFORE, SHORTER = 0.75, 8.0
+"""Part of the way to where velocities end, as they grow, that a step goes there, and by what a step
+is shorter at most than the one before it."""
 
 SAME_DETERMINANT = 0.5
 """Part of a determinant down to which Phi_q counts as no nearer to singular."""
@@ -54,7 +70,7 @@ SAME_DETERMINANT = 0.5
 class State:
     """A point of the motion, complete; or a batch of them, which is the last axis."""
 
-    t: float
+    t: Any  # float or (N,): the time
     point: Point  # the position with Phi and Phi_q
     # q_dot, q_ddot (n,) or (n, N): velocity and acceleration
     q_dot: Array
@@ -102,7 +118,7 @@ class March:
     correction, in scales of the coordinates.
     """
 
-    def __init__(self, equations: Problem, engine: Engine, tolerance: float) -> None:
+    def __init__(self, equations: Problem, engine: Linear, tolerance: float) -> None:
         self.equations, self.engine = equations, engine
         self.tolerance = max(tolerance, equations.floor)
         self._residual = max(RESIDUAL_FACTOR * tolerance, ROUNDING)
@@ -146,6 +162,7 @@ class March:
         loose, tight = (x * equations.reference + rounding for x in (self.tolerance, self._tight))
         done, iterations = np.zeros(q.shape[1], bool), np.zeros(q.shape[1], int)
         good: Any = True
+        is_tight = False
         for iteration in range(most):
             point = engine.evaluate(q, t)
             change = engine.solve(point, point.Phi)
@@ -157,10 +174,13 @@ class March:
             if iteration == 0:  # what it leaves is seen by a second one only
                 good = within(change, reach * equations.reference)
                 continue
-            done = done | within(change, loose)
+            if is_tight := all_within(change, tight):  # nearly always; what is tight is loose
+                done[:] = True
+            else:
+                done = done | within(change, loose)
             if done.all():
                 break
-        if not (done.all() and all_within(change, tight)):
+        if not is_tight:
             point = engine.evaluate(q, t)
         return Corrected(point, good & done & equations.holds(point, self._residual), iterations)
 
@@ -177,16 +197,16 @@ class March:
             sensitivity, probed = before.sensitivity, before.probed
         if probed is None or not (np.abs(determinants) >= SAME_DETERMINANT * probed).all():
             probed = np.abs(determinants)
-            rates = engine.rates(point, column(equations.magnitude * equations.probe, point.q))
-            reference = column(equations.reference, point.q)
-            sensitivity = (np.abs(rates.movement) / reference).max(axis=0)
+            besides = column(equations.magnitude * equations.probe, point.q)
+            rates = engine.solved(equations, point, besides)
+            sensitivity = equations.extent(rates.movement)
         else:
-            rates = engine.rates(point, None)
+            rates = engine.solved(equations, point)
         finite = np.isfinite((rates.q_dot + rates.q_ddot).sum(axis=0))
         checks = (
             (sensitivity < SINGULAR_SENSITIVITY, Status.SINGULAR),
             (finite, Status.NOT_FINITE),
-            (rates.agree, Status.SINGULAR),
+            (rates.are_met, Status.SINGULAR),
         )
         numbers = rates.q_dot, rates.q_ddot, determinants, sensitivity, probed
         return State(point.t, point, *numbers), checks
@@ -202,15 +222,16 @@ class March:
     def predict(self, state: State, t: float) -> Array:
         """Return the position at a time that velocity and acceleration lead to."""
         h = t - state.t
-        return state.point.q + h * (state.q_dot + (h / 2) * state.q_ddot)
+        predicted: Array = state.point.q + h * (state.q_dot + (h / 2) * state.q_ddot)
+        return predicted
 
     def error(self, state: State, q: Array, predicted: Array) -> tuple[Any, Any]:
         """Return how far Newton ended from the prediction, and where that is near enough.
 
         Near enough to have stayed on the branch.
         """
-        error = distance(q, predicted, self.equations.reference)
-        movement = distance(predicted, state.point.q, self.equations.reference)
+        error = self.equations.extent(q - predicted)
+        movement = self.equations.extent(predicted - state.point.q)
         allowed = np.minimum(LARGE_ERROR, np.maximum(SMALL_ERROR, ALLOWED_PART * movement))
         return error, error <= allowed
 
@@ -223,7 +244,7 @@ class March:
         """
         h = following.t - state.t
         expected = state.q_dot + h * state.q_ddot
-        kink = abs(h) * distance(following.q_dot, expected, self.equations.reference)
+        kink = abs(h) * self.equations.extent(following.q_dot - expected)
         signs = np.sign(self.engine.determinants(following.point, state.point))
         same = (signs == np.sign(state.determinants)).all(axis=0)
         smooth = (following.sensitivity <= NEARLY_SINGULAR) | (kink <= KINK * error + SMOOTH)
@@ -255,11 +276,63 @@ class March:
         is_far = following.sensitivity <= TOO_NEAR
         return following, all_hold(found.good & near & is_far, checks), found.iterations
 
-    def time_of(self, state: State) -> float:
-        """Return the time in which something moves as far as its scale, infinite at rest."""
-        reference = self.equations.reference
-        speed, growth = (np.abs(x) / reference for x in (state.q_dot, state.q_ddot))
-        return float(1 / max(speed.max(), math.sqrt(growth.max()), 1e-300))
+    def lock_up(self, begin: State, state: State, t: Array, smallest: Array) -> Any:
+        """Say of a batch that cannot be taken on by its smallest step where it is at a lock-up.
+
+        There velocities grow as one over the root of the time that is left: they have grown since
+        the begin of the way to `t`, where the equations have values.
+        """
+        forward = t - state.t
+        speed, left = self.until_lock_up(state, forward)
+        grown = speed >= GROWN * self.equations.extent(begin.q_dot)
+        before = np.abs(forward) - left > BEFORE_LOCK_UP * np.abs(t - begin.t)
+        there = self.engine.evaluate(state.point.q, t).Phi
+        finite = np.isfinite(sum(row for row in there) + np.zeros(speed.shape))
+        return (left <= LEFT * smallest) & grown & before & finite
+
+    def bifurcation(self, state: State, t: Any, smallest: Array) -> Any:
+        """Say of a batch that cannot be taken on by its smallest step where it is at a bifurcation.
+
+        Phi_q is nearly singular there, and the motion goes on as it was predicted beyond where a
+        lock-up might be.
+        Equations that are left out may forbid one of the ways: nothing is said where there are any.
+        """
+        if self.equations.code.redundant:
+            return False
+        ahead = np.maximum(BEYOND * self.time_of(state), LEFT * smallest)
+        forward = np.copysign(ahead, t - state.t)
+        predicted = self.predict(state, state.t + forward)
+        found = self.correct_together(predicted.copy(), state.t + forward, MAX_CORRECTIONS)
+        beyond, checks = self.complete(found.point)
+        error, near = self.error(state, found.point.q, predicted)
+        _, smooth = self.follows(state, beyond, error)
+        good = found.good & near & (state.sensitivity > CLOSE * TOO_NEAR)
+        return all_hold(good, (*checks, smooth))
+
+    def until_lock_up(self, state: State, forward: Any) -> tuple[Array, Array]:
+        """Return the largest velocities of a batch, in scales, and the time left at its growth.
+
+        That time is infinite where it does not grow towards the sign of `forward`.
+        """
+        reference = column(self.equations.reference, state.q_dot)
+        rates, growths = state.q_dot / reference, state.q_ddot / reference
+        fastest = np.abs(rates).argmax(axis=0), np.arange(rates.shape[1])
+        speed = np.abs(rates[fastest])
+        growth = np.sign(forward) * np.sign(rates[fastest]) * growths[fastest]
+        return speed, np.where(growth > 0, speed / (2 * growth), np.inf)
+
+    def pace(self, state: State, forward: Any, step: Array, good: Any, smallest: Any) -> Array:
+        """Return the sizes of a batch's next steps, after those to states that were good or not."""
+        _, until = self.until_lock_up(state, forward)
+        least = np.maximum(np.abs(step) / SHORTER, np.where(good, 2 * smallest, 0.0))
+        longer = np.abs(step) * np.where(good, GROWTH, 0.5)
+        return np.asarray(np.minimum(longer, np.maximum(BEFORE * until, least)))
+
+    def time_of(self, state: State) -> Any:
+        """Return the time in which something moves as far as its scale, large at rest."""
+        reference = column(self.equations.reference, state.q_dot)
+        speed, growth = ((np.abs(x) / reference).max(axis=0) for x in (state.q_dot, state.q_ddot))
+        return 1 / np.maximum(np.maximum(speed, np.sqrt(growth)), TINY)
 
     def advance(
         self, state: State, t: float, most: int, alive: Callable[[], object] = bool
@@ -297,14 +370,47 @@ class March:
         return Outcome(status, iterations, state)
 
 
-def distance(q: Array, other: Array, reference: Array) -> Any:
-    """Return how far positions are apart, in radians or sizes of the mechanism."""
-    if q.ndim == 1:
-        return (np.abs(q - other) / reference).max()
-    result = np.zeros(q.shape[1:])
-    for here, there, scale in zip(q, other, reference.tolist(), strict=True):
-        np.maximum(result, np.abs(here - there) / scale, out=result)
-    return result
+def batch(states: Sequence[State], combine: Callable[[Sequence[Array]], Array]) -> State:
+    """Return a batch of states whose arrays are combined from those of other batches."""
+    arrays = []
+    for state in states:
+        times, near = (
+            np.broadcast_to(x, state.q_dot.shape[1:]) for x in (state.t, state.sensitivity)
+        )
+        kept = state.determinants if state.probed is None else state.probed
+        arrays.append(
+            (times, state.point.q, state.q_dot, state.q_ddot, state.determinants, near, kept)
+        )
+    t, q, *rest = (combine(parts) for parts in zip(*arrays, strict=True))
+    nothing = np.empty(0)
+    return State(t, Point(q, t, nothing, nothing), *rest)
+
+
+def some_of(state: State, which: Any) -> State:
+    """Return some of a batch of states."""
+    return batch([state], lambda parts: parts[0][..., which])
+
+
+def joined(states: Sequence[State]) -> State:
+    """Return several batches of states as one."""
+    return batch(states, lambda parts: np.concatenate(parts, axis=-1))
+
+
+def chosen(which: Any, one: State, other: State) -> State:
+    """Return of each of a batch one state or the other."""
+    return batch([one, other], lambda parts: np.where(which, *parts))
+
+
+def put(state: State, place: int, alone: State) -> None:
+    """Put a batch of one in a place of another one."""
+
+    def put_each(parts: Sequence[Array]) -> Array:
+        here, own = parts
+        if here.flags.writeable:  # the time, and what all have in common, is not put anywhere
+            here[..., place] = own[..., 0]
+        return here
+
+    batch([state, alone], put_each)
 
 
 Checks = tuple[tuple[Any, Status], ...]

@@ -2,7 +2,7 @@
 
 inputs    checked, in the solver's form            inputs.read_inputs
   -> go through the times                          follow.follow
-       assemble the first point from the guess     newton.start
+       assemble the first point from the guess     start.start
        solve all points together                   grid.solve_grid
        point by point what cannot be trusted       march.March
        find what ends the motion, or go through it events.locate
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from kincompile.runtime.engine.code import Array
     from kincompile.runtime.follow import Progress
     from kincompile.runtime.inputs import Inputs, Values
     from kincompile.runtime.results.solution import Solution
@@ -66,7 +67,9 @@ def solve(
         Parameters; a mapping from names to values overrides the module's DEFAULTS. Where a value is
         an array, ``{"L": [0.2, 0.3, 0.4]}``, or `p` is one of shape (B, 1, k), B variants are
         solved, and the solution's arrays get a leading axis of length B. Several arrays are taken
-        in pairs.
+        in pairs. All are on the branch on which the guess assembles the first set, or else the
+        module's DEFAULTS: they are reached along the line of parameters from it, or are
+        NOT_CONVERGED where only another branch is.
     guess : array_like, shape (n,), or mapping, or None
         Where Newton starts at the first time; a mapping overrides the module's GUESS, with names as
         in a solution: ``{"rod.phi": 1}``.
@@ -81,7 +84,8 @@ def solve(
         which is the compiled march of a module that has one.
     through : {"smooth"}, optional
         Go on past a bifurcation, along the branch on which velocity and acceleration are
-        continuous; a `BranchSwitchWarning` says when. Without it the motion ends there.
+        continuous; a `BranchSwitchWarning` says when. Without it the motion ends there. Of several
+        variants those that meet a bifurcation are followed alone, at some milliseconds each.
     assembly : int, optional
         Start in this one of the ways to assemble the mechanism at the first time, counted from 1 in
         the order of `kc.assemblies`, instead of at a guess.
@@ -120,9 +124,40 @@ def solve(
         digits, with the time. A motion that ends at one has a status and an event instead.
     """
     limits = (tolerance, max_iterations)
-    inputs = read_inputs(module, t, p, guess, *limits, method, through, product)
+    given = (module, t, p, guess, *limits, method, through, product)
+    solution = _solved(given, assembly, None, progress)
+    if throw and not solution.success:
+        raise SolveError(solution.message, solution)
+    return solution
+
+
+def solve_sets(
+    module: ModuleType,
+    t: ArrayLike,
+    sets: Array,
+    guess: Array,
+    p: Array,
+    *,
+    through: str | None = None,
+) -> Solution:
+    """Solve sets of parameters (B, k) on the branch of a position (n,) with parameters p (k,).
+
+    So the chunks of a sweep are on one branch, whichever sets they have.
+    """
+    limits = TOLERANCE, MAX_ITERATIONS
+    given = (module, t, sets[:, np.newaxis], guess, *limits, None, through, False)
+    return _solved(given, None, p, None)
+
+
+def _solved(
+    given: tuple[Any, ...], assembly: int | None, p: Array | None, progress: Progress | None
+) -> Solution:
+    """Check what is given, and solve; sets start with the first parameters, or with p (k,)."""
+    inputs = read_inputs(*given)
     if assembly is not None:
-        inputs = _at_assembly(inputs, guess, assembly)
+        inputs = _at_assembly(inputs, given[3], assembly)
+    if p is not None:
+        inputs = replace(inputs, p=p)
     times, corners = inputs.t, corners_of(inputs)
     inputs = after_corners(inputs, corners)
     with np.errstate(all="ignore"):  # what is not finite gets a status, not a warning
@@ -136,12 +171,10 @@ def solve(
             start = start_of_first(inputs, solution)
     solution = finite(solution)
     if start:
-        warnings.warn(start, AssemblyWarning, stacklevel=2)
+        warnings.warn(start, AssemblyWarning, stacklevel=3)
         solution = replace(solution, message=f"{start} {solution.message}")
     if corners is not None:
         solution = with_corners(solution, times, corners)
-    if throw and not solution.success:
-        raise SolveError(solution.message, solution)
     return solution
 
 

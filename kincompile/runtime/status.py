@@ -26,10 +26,11 @@ class Status(IntEnum):
     CONVERGED = 0, "Position, velocity and acceleration were found, and the equations hold."
     NOT_CONVERGED = (
         1,
-        "No position was found, or none that continues the motion: the mechanism cannot be "
-        "assembled there (lock-up: shorten the range of the drivers or change lengths), or it "
-        "would have to jump (make the drivers continuous), or the guess is too far away (give one "
-        "nearer to the assembled mechanism).",
+        "No position was found that continues the motion, though no lock-up ends it: the mechanism "
+        "would have to jump (make the drivers continuous), the guess is too far away (give one "
+        "nearer to the assembled mechanism), or the times are too far apart (ask for more). At the "
+        "first time of one of several parameter sets: no position was found on the branch of the "
+        "first set (solve that set alone, with a guess of its own).",
     )
     SINGULAR = (
         2,
@@ -50,3 +51,14 @@ class Status(IntEnum):
         "where one is needed.",
     )
     NOT_REACHED = 4, "Not tried, because an earlier point failed. Remove the cause of that failure."
+    NOT_ASSEMBLED = (
+        6,
+        "At the first time no position was found: the mechanism cannot be assembled there (change "
+        "lengths, or what the drivers demand), or the guess is too far away (give one nearer to "
+        "the assembled mechanism).",
+    )
+    LOCK_UP = (
+        7,
+        "The motion ends before this time, at a lock-up: the drivers demand what the joints cannot "
+        "give. Shorten the range of the drivers, or change lengths.",
+    )

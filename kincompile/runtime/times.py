@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import TOLERANCE
+from kincompile.criteria import ROOT_LENGTH
 from kincompile.errors import InputError
 from kincompile.names import rate
 from kincompile.runtime.inputs import real_numbers
@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.results.solution import Solution
 
     Array = NDArray[np.float64]
-
-CLOSE = 1e-3 * TOLERANCE
-"""How near to its value, relative to the largest, a column has to come."""
 
 ITERATIONS = 60
 """After which halving alone has found a time to its last digit."""
@@ -81,7 +78,7 @@ def times_at(
         error, slope = np.empty((2, wanted.size))
         error[order] = motion[name] - wanted[order]
         slope[order] = motion[rate(motion.column(name).name)]
-        done = np.abs(error) <= CLOSE * np.abs(column).max()
+        done = np.abs(error) <= ROOT_LENGTH * np.abs(column).max()
         if done.all():
             break
         is_late = forward * error > 0
@@ -106,7 +103,7 @@ def _one_way(known: Solution, name: str, wanted: Array) -> tuple[Array, Array]:
             "the time; look between two times where it goes one way"
         )
     low, high = sorted((column[0], column[-1]))
-    rounding = CLOSE * max(abs(low), abs(high))
+    rounding = ROOT_LENGTH * max(abs(low), abs(high))
     missed = wanted[(wanted < low - rounding) | (wanted > high + rounding)]
     if missed.size:
         why = "" if known.success else f" {known.message}"

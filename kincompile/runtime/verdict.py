@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import MAX_SUBSTEPS
+from kincompile.criteria import LATE, MAX_SUBSTEPS, ZERO
 from kincompile.errors import BranchSwitchWarning, SingularConfigurationWarning
 from kincompile.names import listed
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.singular.assemblies import unchosen
 from kincompile.runtime.singular.reach import impossible, missed
+from kincompile.runtime.start import is_folded
 from kincompile.runtime.status import Status
 from kincompile.tables import pose
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from kincompile.runtime.engine.code import Array, Code
-    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.follow import Motion
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.march import Outcome
@@ -35,9 +36,6 @@ NAMED_EQUATIONS = 3
 
 NAMED_BODIES = 6
 """Of how many bodies a message gives the position."""
-
-LOCATED = 1e-6
-"""How exactly an event is located in time."""
 
 CANNOT_BE = "No position was found: the mechanism cannot be assembled"
 
@@ -58,8 +56,8 @@ WORDS = {
 }
 """What is said of a motion, and of how it ended."""
 
-MET = 1e-9
-"""Residual, relative to the largest, up to which an equation counts as met."""
+UNREACHED = (Status.NOT_CONVERGED, Status.NOT_ASSEMBLED, Status.LOCK_UP)
+"""Statuses of a point at which no position was found."""
 
 
 def finite(solution: Solution) -> Solution:
@@ -97,7 +95,7 @@ def start_of_first(inputs: Inputs, solution: Solution) -> str:
     q, time = solution.q[0, 0].copy(), float(inputs.t[0])
     equations = problem(inputs.code.module, inputs.p, inputs.guess, time)
     guess, found = (equations.at(position, time) for position in (inputs.guess, q))
-    return unchosen(inputs, q, bool(guess and found and equations.is_folded(guess, found)))
+    return unchosen(inputs, q, bool(guess and found and is_folded(equations, guess, found)))
 
 
 def solution_of(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
@@ -106,9 +104,9 @@ def solution_of(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
     success = outcome.status is Status.CONVERGED
     for event in motion.passed:
         text = f"{code.name} goes through a bifurcation at t = {event.t:.10g}, and on"
-        warnings.warn(f"{text} along the smooth branch.", BranchSwitchWarning, stacklevel=3)
+        warnings.warn(f"{text} along the smooth branch.", BranchSwitchWarning, stacklevel=4)
     if motion.near and success:
-        warnings.warn(_nearly(inputs, motion.near), SingularConfigurationWarning, stacklevel=3)
+        warnings.warn(_nearly(inputs, motion.near), SingularConfigurationWarning, stacklevel=4)
     return Solution(
         t=inputs.t,
         q=motion.q,
@@ -161,6 +159,7 @@ def _verdict(inputs: Inputs, motion: Motion, outcome: Outcome) -> str:
         )
     index = int(np.argmax(motion.status != Status.CONVERGED))
     asked = _asked(inputs, outcome)
+    why = motion.undriven or _why(outcome, events, times[index], asked)
     parts = [
         WORDS["failed"].format(
             name=name,
@@ -170,7 +169,7 @@ def _verdict(inputs: Inputs, motion: Motion, outcome: Outcome) -> str:
             status=outcome.status.name,
         ),
         _before(outcome, index),
-        _why(outcome, events, times[index], asked),
+        why,
         _there(inputs, outcome),
     ]
     return " ".join(part for part in parts if part)
@@ -188,7 +187,7 @@ def _before(outcome: Outcome, index: int) -> str:
 def _asked(inputs: Inputs, outcome: Outcome) -> str:
     """Say which drivers and distances ask for more than the mechanism can give, and how much."""
     point = outcome.nearest
-    if point is None or outcome.jumps or outcome.status is not Status.NOT_CONVERGED:
+    if point is None or outcome.jumps or outcome.status not in UNREACHED:
         return ""
     return " ".join(impossible(_equations_at(inputs, point), point.q, point.t))
 
@@ -202,14 +201,14 @@ def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str
 
     Without one, what the status may mean is said in general, and the last event on the way.
     """
-    if outcome.state is None and outcome.status is Status.NOT_CONVERGED:
+    if outcome.status is Status.NOT_ASSEMBLED:
         return f"{CANNOT_BE} at this time: {asked}" if asked else WORDS["not assembled"]
     if outcome.exhausted:
         return WORDS["exhausted"]
     general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
     if events and outcome.state is not None:
         event, end = events[-1], outcome.state.t
-        if abs(event.t - end) + abs(event.t - t) <= abs(t - end) + LOCATED:
+        if abs(event.t - end) + abs(event.t - t) <= abs(t - end) + LATE:
             general = event.message
     return f"{general} {asked}".rstrip()
 
@@ -227,7 +226,7 @@ def _unmet(inputs: Inputs, point: Point) -> str:
     """Say by how much which equations are missed at the best position, and where its bodies are."""
     sizes = np.abs(point.Phi)
     order = np.argsort(-sizes, kind="stable")[:NAMED_EQUATIONS]
-    rows = [row for row in order.tolist() if sizes[row] > MET * sizes[order[0]]]
+    rows = [row for row in order.tolist() if sizes[row] > ZERO * sizes[order[0]]]
     equations = _equations_at(inputs, point)
     worst = ", ".join(missed(equations, point, row) for row in rows)
     places = listed(_places(inputs.code, point.q), most=NAMED_BODIES)

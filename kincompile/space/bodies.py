@@ -35,6 +35,7 @@ SPATIAL = BodyKind(
     frame=SpatialFrame,
     units=(None, None, None, "", "", "", ""),
     drivers=("AbsoluteX", "AbsoluteY", "AbsoluteZ", *("AbsoluteOrientation",) * 4),
+    turning=("AbsoluteOrientation", "RelativeRotation", "Spherical", "Universal"),
     elsewhere={
         **{name: f"spatial.{name}" for name in ALIKE},
         "AbsoluteAngle": "spatial.RelativeRotation from the ground",

@@ -28,8 +28,10 @@ class SpatialConstraint(Constraint):
     """A constraint of bodies in space; every type is a subclass."""
 
     bodies = SPATIAL
-    right_angle: ClassVar[tuple[str, str]] = ("", "")
+    right_angle: ClassVar[tuple[str, ...]] = ()
     """The directions of bodies i and j that it keeps at a right angle by one equation."""
+    alike: ClassVar[tuple[str, ...]] = ()
+    """The directions of bodies i and j of which both point along the shafts the same way."""
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:
@@ -53,19 +55,18 @@ class SpatialConstraint(Constraint):
         points: Mapping[str, tuple[Scalar, ...]],
         defaults: Mapping[str, float],
     ) -> str | None:
-        """Return why directions that it keeps at a right angle cannot be so: they are parallel."""
-        symbols = [symbol for symbol in cls.right_angle if symbol]
-        pairs = zip(bodies, symbols, strict=False)
-        turned = (_turned(body, points[symbol], defaults) for body, symbol in pairs)
-        found = [item for item in turned if item is not None]
-        if len(found) < 2 or not _are_parallel(*found):
-            return None
-        names = [key for key, item in cls.arguments().items() if item.symbol in symbols]
-        return (
-            f"{names[0]} and {names[1]} are parallel at the guess of {bodies[0].name} and "
-            f"{bodies[1].name}, and the joint keeps them at a right angle, which has no slope "
-            "there; give directions that cross, or other orientations of the bodies"
-        )
+        """Return why its directions cannot be at a right angle, or alike, from the guess."""
+        for symbols, are_wrong, text in (
+            (cls.right_angle, _are_parallel, PARALLEL_AT_THE_GUESS),
+            (cls.alike, _are_opposed, OPPOSED_AT_THE_GUESS),
+        ):
+            pairs = zip(bodies, symbols, strict=False)
+            turned = (_turned(body, points[symbol], defaults) for body, symbol in pairs)
+            found = [item for item in turned if item is not None]
+            if len(found) == 2 and are_wrong(*found):
+                names = [key for key, item in cls.arguments().items() if item.symbol in symbols]
+                return text.format(*names, *(body.name for body in bodies))
+        return None
 
     @staticmethod
     def completed(
@@ -78,10 +79,24 @@ class SpatialConstraint(Constraint):
 PARALLEL = 1e-6
 """Sine of the angle between directions that count as parallel."""
 
+PARALLEL_AT_THE_GUESS = (
+    "{0} and {1} are parallel at the guess of {2} and {3}, and the joint keeps them at a right "
+    "angle, which has no slope there; give directions that cross, or other orientations of the "
+    "bodies"
+)
+OPPOSED_AT_THE_GUESS = (
+    "{0} and {1} point against each other at the guess of {2} and {3}, and both should point along "
+    "the shafts the same way; turn one of them round, or give other orientations of the bodies"
+)
+
 
 def _are_parallel(u: NDArray[np.float64], v: NDArray[np.float64]) -> bool:
     sizes = np.linalg.norm(u) * np.linalg.norm(v)
     return bool(np.linalg.norm(np.cross(u, v)) <= PARALLEL * sizes)
+
+
+def _are_opposed(u: NDArray[np.float64], v: NDArray[np.float64]) -> bool:
+    return bool(u @ v < 0)
 
 
 def _turned(

@@ -1,4 +1,8 @@
-"""Guesses of orientations: Euler parameters from what a person knows, with what is wrong."""
+"""Guesses of orientations: Euler parameters from what a person knows, with what is wrong.
+
+They stand in emitted text. So their digits come from plain floats and mpmath: those of a library of
+linear algebra, and of cosines, depend on the processor.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy
 
-from kincompile.model.expressions import as_sympy
+from kincompile.model.expressions import CALCULATED, as_sympy
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -70,7 +74,7 @@ def _given(given: Any) -> tuple[Scalars, str]:
         return tuple(given), ""
     numbers = _numbers(given, "orientation")
     if numbers.shape == (4,):
-        exact = abs(np.linalg.norm(numbers) - 1) < EXACT
+        exact = abs(math.hypot(*numbers.tolist()) - 1) < EXACT
         return (tuple(given), "") if exact else _normalised(numbers)
     if numbers.shape == (3, 3):
         return _of_matrix(numbers)
@@ -81,14 +85,14 @@ def _given(given: Any) -> tuple[Scalars, str]:
 
 
 def _normalised(p: NDArray[np.float64]) -> tuple[Scalars, str]:
-    length = float(np.linalg.norm(p))
-    if length == 0:
+    if not p.any():
         raise OrientationError(
             "the Euler parameters have length zero, which is no orientation; (1, 0, 0, 0) is that "
             "of the ground"
         )
+    length = math.hypot(*p.tolist())
     remark = f"the Euler parameters have length {length:.6g}, and were divided by it"
-    return tuple((p / length).tolist()), remark if abs(length - 1) > ROUNDED else ""
+    return tuple(_unit(p).tolist()), remark if abs(length - 1) > ROUNDED else ""
 
 
 def _about(axis: Any, angle: Any) -> Scalars:
@@ -101,7 +105,7 @@ def _about(axis: Any, angle: Any) -> Scalars:
     except (TypeError, ValueError, sympy.SympifyError):
         raise OrientationError(f"the angle {angle!r} is not a number") from None
     if half.is_number:
-        c, s = math.cos(_finite(half)), math.sin(_finite(half))
+        c, s = (float(function(_finite(half))) for function in (CALCULATED.cos, CALCULATED.sin))
         return c, *(s * item for item in u.tolist())
     return sympy.cos(half), *(sympy.sin(half) * item for item in u.tolist())
 
@@ -115,11 +119,10 @@ def _from_axes(given: Mapping[str, Any]) -> NDArray[np.float64]:
         )
     (first, second), known = given, {key: _direction(item, key) for key, item in given.items()}
     u = known[first]
-    beside = known[second] - (known[second] @ u) * u
-    size = float(np.linalg.norm(beside))
-    if size < ROUNDED:
+    beside = known[second] - sum((known[second] * u).tolist()) * u
+    if math.hypot(*beside.tolist()) < ROUNDED:
         raise OrientationError(f"its axes {first} and {second} are parallel; give two that cross")
-    columns = {first: u, second: beside / size}
+    columns = {first: u, second: _unit(beside)}
     order = "xyz"
     third = next(key for key in order if key not in columns)
     before, after = (order[(order.index(third) + k) % 3] for k in (1, 2))
@@ -140,11 +143,18 @@ def _of_matrix(matrix: NDArray[np.float64]) -> tuple[Scalars, str]:
             f"the matrix is left-handed, its determinant is {determinant:.3g}; turn one axis "
             "round, so that z = x cross y"
         )
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = Rotation.from_matrix(matrix).as_quat()
-    sign = -1.0 if w < 0 else 1.0
-    return tuple(float(sign * item) for item in (w, x, y, z)), ""
+    # 4 p p^T by the entries of A; its column with the largest diagonal is p without loss of digits.
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    products = np.array(
+        [
+            [1 + a + e + i, h - f, c - g, d - b],
+            [h - f, 1 + a - e - i, d + b, c + g],
+            [c - g, d + b, 1 - a + e - i, h + f],
+            [d - b, c + g, h + f, 1 - a - e + i],
+        ]
+    )
+    p = _unit(products[int(np.argmax(np.diag(products)))])
+    return tuple(((-p if p[0] < 0 else p) + 0.0).tolist()), ""  # no -0.0
 
 
 def _finite(half: sympy.Expr) -> float:
@@ -156,10 +166,15 @@ def _finite(half: sympy.Expr) -> float:
 
 def _direction(given: Any, what: str) -> NDArray[np.float64]:
     numbers = _numbers(given, what)
-    size = float(np.linalg.norm(numbers))
-    if numbers.shape != (3,) or size == 0:
+    if numbers.shape != (3,) or not numbers.any():
         raise OrientationError(f"{what} is {given!r}; give three numbers, not all zero")
-    return numbers / size
+    return _unit(numbers)
+
+
+def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a vector at length one; the squares of its numbers may be out of range."""
+    vector = vector / np.abs(vector).max()
+    return np.asarray(vector / math.hypot(*vector.tolist()))
 
 
 def _numbers(given: Any, what: str) -> NDArray[np.float64]:

@@ -25,7 +25,7 @@ from kincompile.space.constraint import SpatialConstraint, SpatialPoints
 from kincompile.space.symbols import f_i, f_j, g_i, g_j, h_i, h_j, i, j, separation
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import sympy
 
@@ -52,6 +52,11 @@ def angle_from(reference: Scalar) -> Scalar:
     cosine, sine = dot(i.A(f_i), j.A(f_j)), dot(i.A(g_i), j.A(f_j))
     c, s = Circular("cos", reference), Circular("sin", reference)
     return Angle(sine * c - cosine * s, cosine * c + sine * s)
+
+
+def angle_from_driver() -> Scalar:
+    """Return theta - alpha, with the angle theta that is nearest to the value C of a driver."""
+    return angle_from(C) + C - contact_i.alpha
 
 
 @constraint_type
@@ -136,6 +141,7 @@ class RelativeTranslation(AxisAndPoint):
     """A point on body j is at C along an axis of body i, counted from a point on the axis."""
 
     source = "Haug 9.4"
+    sets_motion = True
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -166,6 +172,19 @@ class PointsAndAxes(AxisAndPoint):
     axis_j: PointLike = argument.axis("h_j", on="j")
 
 
+def motor(joint: PointsAndAxes | Triads, points: Mapping[str, tuple[ValueLike, ...]]) -> Constraint:
+    """Return a driver of the turning about the axis of a joint."""
+    f_i, h_i, f_j, h_j = (points[key] for key in ("f_i", "h_i", "f_j", "h_j"))
+    return RelativeRotation(joint.name, joint.i, h_i, f_i, joint.j, h_j, f_j, 0)
+
+
+def slide(joint: PointsAndAxes | Triads) -> Constraint:
+    """Return a driver of the sliding along the axis of a joint."""
+    return RelativeTranslation(
+        joint.name, joint.i, joint.point_i, joint.axis_i, joint.j, joint.point_j, 0
+    )
+
+
 @constraint_type
 class Revolute(PointsAndAxes):
     """Body j turns about an axis of body i: a hinge."""
@@ -182,6 +201,10 @@ class Revolute(PointsAndAxes):
             (slides, turns)
         )
 
+    def drivers(self, points: Mapping[str, tuple[ValueLike, ...]]) -> tuple[Constraint, ...]:
+        """Return a motor of the hinge."""
+        return (motor(self, points),)
+
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
         """Return d, f_i^T h_j and g_i^T h_j."""
@@ -195,6 +218,10 @@ class Cylindrical(PointsAndAxes):
     source = "Haug 9.4"
     row_names = ("parallel_f", "parallel_g", "line_f", "line_g")
 
+    def drivers(self, points: Mapping[str, tuple[ValueLike, ...]]) -> tuple[Constraint, ...]:
+        """Return a motor and a slide."""
+        return motor(self, points), slide(self)
+
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
         """Return f_i^T h_j, g_i^T h_j, f_i^T d and g_i^T d."""
@@ -207,6 +234,10 @@ class Planar(PointsAndAxes):
 
     source = "Haug 9.4"
     row_names = ("parallel_f", "parallel_g", "plane")
+
+    def drivers(self, points: Mapping[str, tuple[ValueLike, ...]]) -> tuple[Constraint, ...]:
+        """Return a motor about the normal."""
+        return (motor(self, points),)
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -265,6 +296,11 @@ class Translational(Triads):
     right_angle = ("f_i", "f_j")
     row_names = ("parallel_f", "parallel_g", "line_f", "line_g", "cross")
 
+    def drivers(self, points: Mapping[str, tuple[ValueLike, ...]]) -> tuple[Constraint, ...]:
+        """Return a slide."""
+        del points
+        return (slide(self),)
+
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
         """Return the rows of a cylindrical joint and f_i^T f_j."""
@@ -286,46 +322,22 @@ class Fixed(Triads):
 
 @constraint_type
 class ConstantVelocity(Triads):
-    """Two shafts meet in a point and turn at the same rate, whatever the angle between them."""
+    """Two shafts meet in a point and turn at the same rate, whatever the angle between them.
 
+    The axes point along both shafts the same way, from one end of the line of shafts to the other.
+    Straight, the crosses are one direction; bent, body j is turned by the bend and nothing else.
+    The rows also hold with one shaft turned by half a turn: the guess decides.
+    """
+
+    # It has f_i^T g_j + g_i^T f_j, for axes that both point away from the joint.
     source = "OndselSolver"
+    alike = ("h_i", "h_j")
     row_names = (*XYZ, "cross")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
-        """Return d and f_i^T g_j + g_i^T f_j."""
-        return separation(), dot(i.A(f_i), j.A(g_j)) + dot(i.A(g_i), j.A(f_j))
-
-
-@constraint_type
-class Screw(Triads, CamConstraint):
-    """Body j turns about an axis of body i and advances by the pitch in each turn.
-
-    Its angle is a coordinate ``theta_<name>``, from the cross of body i to that of body j over any
-    number of turns; so a motion keeps its turn. The points coincide where the angle is zero.
-    """
-
-    source = "Haug 9.4"
-    row_names = ("parallel_f", "parallel_g", "line_f", "line_g", "turn", "advance")
-    contacts = (contact_i,)
-    contact_letter = "theta"
-    pitch: ValueLike = argument.radius("pitch", "Advance in one turn")
-
-    @staticmethod
-    def Phi() -> tuple[Expression, ...]:
-        """Return the rows of a cylindrical joint, theta - alpha and h_i^T d - pitch alpha/(2 pi).
-
-        Of all angles theta it is the one nearest to the coordinate alpha.
-        """
-        alpha = contact_i.alpha
-        advance = Symbol("pitch") * alpha / (2 * Pi())
-        along = dot(i.A(h_i), separation()) - advance
-        return *parallel(), *on_line(), angle_from(alpha), along
-
-    @property
-    def theta(self) -> sympy.Symbol:
-        """Symbol of the angle."""
-        return self.alpha
+        """Return d and g_i^T f_j - f_i^T g_j."""
+        return separation(), dot(i.A(g_i), j.A(f_j)) - dot(i.A(f_i), j.A(g_j))
 
 
 @constraint_type
@@ -345,12 +357,56 @@ class RelativeRotation(Turning):
     """The angle of the cross of body j from that of body i, about the axis of body i, is C."""
 
     source = "Haug 9.4"
+    sets_motion = True
     angle: ValueLike = argument.value("rad")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
         """Return theta - C with theta = atan2(g_i^T f_j, f_i^T f_j), the one nearest to C."""
         return (angle_from(C),)
+
+
+def advance() -> Scalar:
+    """Return h_i^T d - pitch alpha/(2 pi): how far body j is from where its angle alpha puts it."""
+    return dot(i.A(h_i), separation()) - Symbol("pitch") * contact_i.alpha / (2 * Pi())
+
+
+@constraint_type
+class Screw(Triads, CamConstraint):
+    """Body j turns about an axis of body i and advances by the pitch in each turn.
+
+    Its angle is a coordinate ``theta_<name>``, from the cross of body i to that of body j over any
+    number of turns; so a motion keeps its turn. The points coincide where the angle is zero.
+    """
+
+    source = "Haug 9.4"
+    row_names = ("parallel_f", "parallel_g", "line_f", "line_g", "turn", "advance")
+    contacts = (contact_i,)
+    contact_letter = "theta"
+    driven_by = RelativeRotation
+    pitch: ValueLike = argument.radius("pitch", "Advance in one turn")
+
+    def drivers(self, points: Mapping[str, tuple[ValueLike, ...]]) -> tuple[Constraint, ...]:
+        """Return a motor of the spindle."""
+        return (motor(self, points),)
+
+    @staticmethod
+    def Phi() -> tuple[Expression, ...]:
+        """Return the rows of a cylindrical joint, theta - alpha and h_i^T d - pitch alpha/(2 pi).
+
+        Of all angles theta it is the one nearest to the coordinate alpha.
+        """
+        return *parallel(), *on_line(), angle_from(contact_i.alpha), advance()
+
+    @staticmethod
+    def beside_driver() -> tuple[Expression, ...]:
+        """Return the same with the angle theta that is nearest to the driver's C."""
+        return *parallel(), *on_line(), angle_from_driver(), advance()
+
+    @property
+    def theta(self) -> sympy.Symbol:
+        """Symbol of the angle."""
+        return self.alpha
 
 
 @constraint_type
@@ -364,11 +420,17 @@ class JointAngle(Turning, CamConstraint):
     source = "own"
     contacts = (contact_i,)
     contact_letter = "theta"
+    driven_by = RelativeRotation
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
         """Return theta - alpha: of all angles theta the one nearest to the coordinate alpha."""
         return (angle_from(contact_i.alpha),)
+
+    @staticmethod
+    def beside_driver() -> tuple[Expression, ...]:
+        """Return theta - alpha: of all angles theta the one nearest to the driver's C."""
+        return (angle_from_driver(),)
 
     @property
     def theta(self) -> sympy.Symbol:

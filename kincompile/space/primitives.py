@@ -181,6 +181,7 @@ class AbsoluteOrientation(SpatialConstraint):
     """
 
     source = "Haug 9.4"
+    sets_motion = True
     row_names = ("e1", "e2", "e3")
     body: BodyLike = argument.body("i")
     vector: PointLike = argument.vector("u", on="i")

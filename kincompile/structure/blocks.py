@@ -187,6 +187,16 @@ class BlockForm:
         of_row = components(rows, owner[columns], size)
         return cls(rows, columns, of_row, of_row[owner])
 
+    def order(self) -> tuple[Index, Index, Index]:
+        """Return rows and columns (size,) in an order of solution, and the sizes of the blocks."""
+        needs = self.needs()
+        number = np.arange(self.of_row.max(initial=-1) + 1)
+        if (needs[0] < needs[1]).any():  # SciPy numbers what is needed first
+            number[order_of_solution(np.unique(needs, axis=1), number.tolist())] = number.copy()
+        labels = number[self.of_row], number[self.of_column]
+        rows, columns = (np.argsort(label, kind="stable") for label in labels)
+        return rows, columns, np.bincount(labels[0])
+
     def is_inner(self) -> NDArray[np.bool_]:
         """Return which entries lie within a block, shape (nnz,)."""
         return np.asarray(self.of_row[self.rows] == self.of_column[self.columns])

@@ -13,6 +13,7 @@ them there as well; one that does not is independent of them, and the states wer
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -20,7 +21,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from kincompile.criteria import ASSEMBLED, size_of
+from kincompile.criteria import ASSEMBLED, HALF, NEAR_MISS, SLIGHT, size_of
 from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.structure.blocks import SMALL
@@ -28,6 +29,8 @@ from kincompile.structure.blocks import SMALL
 Array: TypeAlias = NDArray[np.float64]
 Evaluate: TypeAlias = Callable[[Array, Array], tuple[Array, Array]]
 """Gives Phi (S, m) and Phi_q (S, m, n) at states q (S, n), t (S,)."""
+State: TypeAlias = tuple[Array, Array]
+"""Coordinates q (1, n) and time t (1,)."""
 
 STATES, SEED = 5, 1989
 """States at which the rank is taken; the largest counts, since any of them may be singular."""
@@ -40,7 +43,7 @@ ITERATIONS, PATIENCE = 60, 8
 """Steps of Levenberg and Marquardt towards an assembled state, and how many good ones may go by
 that shorten the residual by less than a hundredth."""
 
-DEPENDENT = 1e-6
+DEPENDENT = SLIGHT
 """Part of a row that is left when the rows before are taken out of it, below which it depends."""
 
 ASIDE = (0.1, 0.03, 0.01, 1e-3, 1e-4)
@@ -49,16 +52,12 @@ ASIDE = (0.1, 0.03, 0.01, 1e-3, 1e-4)
 ON_MANIFOLD = 0.25
 """Part of such a step that assembling the joints may change: else it led to another branch."""
 
-NEARLY, MISSED = 1e-3, 10.0
-"""How much, in scales of the equations, joints that cannot be assembled may miss each other to be
-told apart, and how many times that the rows that differ by it may be independent of the others."""
+MISSED = 10.0
+"""How many times what joints miss that cannot be assembled, rows that differ by it may be
+independent of the others."""
 
-UNSURE = 1e-3
+UNSURE = math.sqrt(DEPENDENT)
 """What stands for `DEPENDENT` where no position is settled: each is wrong by the root of that."""
-
-SETTLED = 1e-8
-"""Last step, in scales of the coordinates, of a position that is known well enough for a rank:
-at a singular position equations hold to 1e-12 when the position is still wrong by 1e-6."""
 
 ANGLES_FIRST = 10.0
 """How much rather a driver is an angle than a length: motors turn."""
@@ -79,6 +78,9 @@ class RankReport:
     free: tuple[int, ...]  # columns that no equation determines
     # As many of them as there are degrees of freedom: with these driven, nothing is free.
     drive: tuple[int, ...]
+    # (dof, n): orthonormal directions, in scales, in which it may move at the generic state.
+    motions: Array
+    state: State  # the generic one
     # Whether joints and drivers, as far as they are independent, could be assembled at the start.
     assembled: bool
     # Rank at the start; where it is less than `rank` and the system is assembled, that position is
@@ -168,11 +170,13 @@ class _Analysis:
         order, limit = [*self._joints, *self._drivers], DEPENDENT
         if chosen.any():
             sure = DEPENDENT if settled[chosen].all() else UNSURE
-            matrix = self._beside(q[chosen], self._t[chosen], sure)
+            state = self._beside(q[chosen], self._t[chosen], sure)
         elif nearly := self._nearly_assembled(q):
-            q, matrix, limit = nearly
+            q, state, limit = nearly
         else:  # which joints are too many, if any, shows elsewhere too
-            q, matrix = self._q, max(self._scaled(self._q[1:], self._t[1:]), key=_rank)
+            q, ranks = self._q, [_rank(x) for x in self._scaled(self._q[1:], self._t[1:])]
+            state = self._state(q, self._t, 1 + int(np.argmax(ranks)))
+        matrix = self._scaled(*state)[0]
         kept, dependent = _split(matrix, order, limit)
         # A joint that holds at an assembled state, and depends on others beside it, repeats them.
         repeating = [row for row in dependent if row not in self._drivers and chosen.any()]
@@ -181,14 +185,18 @@ class _Analysis:
         if not chosen.any() and not wrong:
             wrong = set(dependent)
         nearest, together, _ = self._assemble(kept, q[:1], self._t[:1])
-        free, drive = _left_over(matrix[kept], self._angular)
+        motions = np.linalg.svd(matrix[kept])[2][len(kept) :]
+        weights = np.where(self._angular, ANGLES_FIRST, 1.0)
+        drive, _ = drivers_of(motions, np.eye(motions.shape[1]), weights)
         return RankReport(
             rank=len(kept),
             redundant=tuple(sorted(set(dependent) - wrong)),
             conflicting=tuple(sorted(wrong)),
             partners=_partners(matrix, kept, dependent),
-            free=free,
-            drive=drive,
+            free=tuple(np.flatnonzero(np.max(np.abs(motions), 0, initial=0) > DEPENDENT).tolist()),
+            drive=tuple(sorted(drive)),
+            motions=motions,
+            state=state,
             assembled=bool(together[0]),
             rank_at_start=_rank(self._scaled(nearest, self._t[:1])[0]),
             nearest=nearest[0],
@@ -196,24 +204,29 @@ class _Analysis:
             scale=self._scale,
         )
 
-    def _nearly_assembled(self, q: Array) -> tuple[Array, Array, float] | None:
+    @staticmethod
+    def _state(q: Array, t: Array, index: int) -> State:
+        """Return one of some states."""
+        return q[index : index + 1], t[index : index + 1]
+
+    def _nearly_assembled(self, q: Array) -> tuple[Array, State, float] | None:
         """Return where joints almost hold that cannot hold exactly, and what depends on others.
 
         There a row that would repeat others, were the lengths right, differs from them by about as
-        much as the equations are missed. The others can be assembled. Returns states, Phi_q at the
-        best of them and the limit for what depends; None where that is not the case.
+        much as the equations are missed. The others can be assembled. Returns states, the best of
+        them and the limit for what depends; None where that is not the case.
         """
         missed = np.max(np.abs(self._weighted(q, self._t, self._joints)[0]), axis=1)
         best = int(np.argmin(missed))
-        if len(self._terms) <= q.shape[1] or not missed[best] <= NEARLY:
+        if len(self._terms) <= q.shape[1] or not missed[best] <= NEAR_MISS:
             return None
-        matrix, limit = self._scaled(q, self._t)[best], max(DEPENDENT, MISSED * missed[best])
-        kept, dependent = _split(matrix, self._joints, limit)
+        state, limit = self._state(q, self._t, best), max(DEPENDENT, MISSED * missed[best])
+        kept, dependent = _split(self._scaled(*state)[0], self._joints, limit)
         _, held, _ = self._assemble(kept, q, self._t)
-        return (q, matrix, limit) if dependent and held.any() else None
+        return (q, state, limit) if dependent and held.any() else None
 
-    def _beside(self, q: Array, t: Array, limit: float) -> Array:
-        """Return Phi_q at the best of some assembled states, or where it has a larger rank beside.
+    def _beside(self, q: Array, t: Array, limit: float) -> State:
+        """Return the best of some assembled states, or where Phi_q has a larger rank beside it.
 
         There the independent joints hold, and a row that repeats them depends on them, too.
         """
@@ -221,7 +234,7 @@ class _Analysis:
         best = max(range(len(q)), key=lambda k: _rank_and_gap(matrices[k], limit))
         kept, dependent = _split(matrices[best], self._joints, limit)
         if not dependent or len(kept) == matrices.shape[2]:
-            return np.asarray(matrices[best])
+            return self._state(q, t, best)
         tangents = np.linalg.svd(matrices[best][kept])[2][len(kept) :]
         random, lengths = np.random.default_rng(SEED), np.array(ASIDE)[:, np.newaxis]
         steps = random.uniform(-1, 1, (len(ASIDE), len(tangents))) @ tangents
@@ -229,8 +242,9 @@ class _Analysis:
         times, start = np.full(len(ASIDE), t[best]), q[best] + steps * self._scale
         moved, held, settled = self._assemble(kept, start, times)
         near = (np.abs(moved - start) <= ON_MANIFOLD * lengths * self._scale).all(axis=1)
-        beside = self._scaled(moved, times)[held & settled & near]
-        return np.asarray(max([matrices[best], *beside], key=_rank))
+        usable = held & settled & near
+        states = np.vstack([q[best], moved[usable]]), np.append(t[best], times[usable])
+        return self._state(*states, int(np.argmax([_rank(x) for x in self._scaled(*states)])))
 
     def _contradictions(
         self, q: Array, kept: list[int], dependent: list[int], repeating: list[int]
@@ -265,7 +279,8 @@ class _Analysis:
         size = np.sum(Phi * Phi, axis=1)
         for _ in range(ITERATIONS):
             held = np.max(np.abs(Phi), axis=1, initial=0.0) <= ASSEMBLED / 100
-            settled, stuck = held & (step <= SETTLED), (idle >= PATIENCE) | (damping >= 1e3)
+            # At a singular position equations hold to 1e-12 while q is still wrong by 1e-6.
+            settled, stuck = held & (step <= HALF), (idle >= PATIENCE) | (damping >= 1e3)
             if (held | stuck).all() and (settled.any() or not held.any()):
                 break
             active = np.flatnonzero(~settled & ~stuck)
@@ -285,7 +300,7 @@ class _Analysis:
             step[active] = np.max(np.abs(steps), axis=1)
             factors = np.where(better, 0.1, 8.0)
             damping[active] = np.clip(damping[active] * factors, 1e-13, 1e3)
-        return q, np.max(np.abs(Phi), axis=1, initial=0.0) <= ASSEMBLED, step <= SETTLED
+        return q, np.max(np.abs(Phi), axis=1, initial=0.0) <= ASSEMBLED, step <= HALF
 
     def _weighted(self, q: Array, t: Array, rows: list[int]) -> tuple[Array, Array]:
         """Return some rows of Phi and Phi_q, in scales of equations and coordinates."""
@@ -352,24 +367,19 @@ def _partners(matrix: Array, kept: list[int], dependent: list[int]) -> dict[int,
     }
 
 
-def _left_over(
-    matrix: Array, angular: NDArray[np.bool_]
-) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return the columns that independent rows leave free, and those to drive so that none is.
+def drivers_of(motions: Array, rows: Array, weights: Array) -> tuple[list[int], Array]:
+    """Return rows to drive one after the other, each where it moves most; and the motions left.
 
-    A column is free where some null vector is not zero. One column after the other is driven where
-    the null vectors are largest, and those that still move it are taken out.
+    `motions` (dof, n) are directions in which a mechanism may move, `rows` (k, n) the rates that
+    drivers may give, `weights` (k,) how much rather one is taken.
     """
-    rank, n = matrix.shape
-    if rank == n:
-        return (), ()
-    null = np.linalg.svd(matrix)[2][rank:]
-    free = tuple(np.flatnonzero(np.max(np.abs(null), axis=0) > DEPENDENT).tolist())
-    drive = []
-    for _ in range(n - rank):
-        lengths = np.linalg.norm(null, axis=0)
-        column = int(np.argmax(lengths * np.where(angular, ANGLES_FIRST, 1.0)))
-        drive.append(column)
-        along = null[:, column] / lengths[column]
-        null = null - np.outer(along, along @ null)
-    return free, tuple(sorted(drive))
+    taken: list[int] = []
+    while len(motions) and len(rows):
+        rates = rows @ motions.T
+        lengths = np.linalg.norm(rates, axis=1)
+        row = int(np.argmax(lengths * weights))
+        if not lengths[row] > DEPENDENT:
+            break
+        taken.append(row)
+        motions = np.linalg.svd(rates[row : row + 1])[2][1:] @ motions
+    return taken, motions

@@ -11,6 +11,8 @@ from kincompile.model.resolve import Joint
 from kincompile.names import listed
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from kincompile.model.resolve import FreeEquation
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.rank import RankReport
@@ -106,17 +108,47 @@ class MissingDriver:
         Its type, as ``"AbsoluteAngle"``; ``"Equation"`` for a coordinate that belongs to no body.
     drives
         Name of the body, or of the coordinate.
+    joint
+        Name of the joint whose motion it drives; "" where it drives none.
+    instead
+        What else takes the freedom away; "" where nothing does.
+    axis
+        The axis of the ground that it turns the body about, ``"x"``, ``"y"`` or ``"z"``; "" where
+        it needs none.
     """
 
     kind: str
     drives: str
+    joint: str = ""
+    instead: str = ""
+    axis: str = ""
 
     @property
     def text(self) -> str:
         """The driver in words."""
         if self.kind == "Equation":
             return f"an equation that gives {self.drives}"
-        return f"{self.kind} of {self.drives}"
+        place = f" at {self.joint}" if self.joint else ""
+        other = f" (or {self.instead})" if self.instead else ""
+        about = f" about the {self.axis} axis" if self.axis else ""
+        return f"{self.kind} of {self.drives}{about}{place}{other}"
+
+
+def advice(missing: Sequence[MissingDriver]) -> str:
+    """Return how many drivers are missing, and which to add."""
+    count = "a driver is" if len(missing) == 1 else f"{len(missing)} drivers are"
+    # An AbsoluteOrientation drives three.
+    drivers = listed(dict.fromkeys(item.text for item in missing))
+    return f"{count} missing: add, for instance, {drivers}, as a function of kc.t"
+
+
+def rank_problem(system: ConstraintSystem, ranks: RankReport) -> str:
+    """Return that equations depend on others, and so leave coordinates undetermined."""
+    n, m = len(system.coordinates), len(system.equations)
+    return (
+        f"{system.name!r} has {m} equations for {n} coordinates, but at assembled positions only "
+        f"{ranks.rank} of them are independent: velocities are not determined"
+    )
 
 
 def surpluses(system: ConstraintSystem, ranks: RankReport) -> tuple[Surplus, ...]:
@@ -152,7 +184,7 @@ def _surplus(
 ) -> Surplus:
     kind, instead, advice = "Equation", "", ""
     if isinstance(item, Joint):
-        kind, advice = item.template.type_name, item.written.replaced_by
+        kind, advice = item.type_name, item.written.replaced_by
         lost = [name.removeprefix(f"{item.name}.") for name in equations]
         simpler = item.written.keeping_others(lost)
         instead = simpler.__name__ if simpler else ""
@@ -162,22 +194,13 @@ def _surplus(
     )  # fmt: skip
 
 
-def missing_drivers(system: ConstraintSystem, ranks: RankReport) -> tuple[MissingDriver, ...]:
-    """Return a driver for each degree of freedom: with all of them, nothing may move by itself."""
-    driven = [
-        MissingDriver(kind, body.name) for body in system.bodies for kind in body.kind.drivers
-    ]
-    others = system.coordinates[len(driven) :]
-    driven += [MissingDriver("Equation", item.name) for item in others]
-    return tuple(driven[column] for column in ranks.drive)
-
-
 def least_squares_will_do(system: ConstraintSystem, ranks: RankReport) -> bool:
     """Return whether there are too many equations, but all that are too many agree with the others.
 
-    Without a driver nothing moves, and too many equations are a mistake rather than a special
-    geometry.
+    Without a driver or a parameter nothing moves, and too many equations are a mistake rather than
+    a special geometry.
     """
     n, m = len(system.coordinates), len(system.equations)
     agree = ranks.assembled and ranks.rank == n and len(ranks.redundant) == m - n
-    return m > n and agree and any(item.is_driver for item in system.constraints)
+    moves = bool(system.parameters) or any(item.is_driver for item in system.constraints)
+    return m > n and agree and moves

@@ -10,7 +10,7 @@ from kincompile.model.resolve import Joint
 from kincompile.structure.blocks import parts_of
 from kincompile.structure.counting import counting_problem, unmatched
 from kincompile.structure.findings import ConstraintEntry, Findings, Mobility, NamedBlock
-from kincompile.structure.remedies import least_squares_will_do, missing_drivers, surpluses
+from kincompile.structure.remedies import least_squares_will_do, rank_problem, surpluses
 from kincompile.structure.report_text import report_text
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.counting import Pattern
     from kincompile.structure.rank import RankReport
+    from kincompile.structure.remedies import MissingDriver
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -31,8 +32,16 @@ class Inspection(Shown, Findings):
         return report_text(self)
 
 
-def inspect_system(system: ConstraintSystem, pattern: Pattern, ranks: RankReport) -> Inspection:
-    """Count what there is in a checked system, given the pattern of its Phi_q and its rank."""
+def inspect_system(
+    system: ConstraintSystem,
+    pattern: Pattern,
+    ranks: RankReport,
+    missing: tuple[MissingDriver, ...],
+) -> Inspection:
+    """Count what there is in a checked system.
+
+    Given are the pattern of its Phi_q, its rank, and the drivers that it lacks.
+    """
     equations, coordinates = unmatched(system, pattern)
     names, columns = system.equations, [item.name for item in system.coordinates]
     entries = sorted((int(row), int(column)) for row, column in pattern)
@@ -59,7 +68,7 @@ def inspect_system(system: ConstraintSystem, pattern: Pattern, ranks: RankReport
         conflicting=tuple(names[row] for row in ranks.conflicting),
         surpluses=surpluses(system, ranks),
         free_coordinates=tuple(columns[column] for column in ranks.free),
-        missing_drivers=missing_drivers(system, ranks),
+        missing_drivers=missing,
         too_many=named(whole.too_many_rows, whole.too_many_columns),
         too_few=named(whole.too_few_rows, whole.too_few_columns),
         blocks=tuple(
@@ -73,7 +82,7 @@ def inspect_system(system: ConstraintSystem, pattern: Pattern, ranks: RankReport
 
 
 def _entry(item: Joint | FreeEquation, first_row: int) -> ConstraintEntry:
-    kind = item.template.type_name if isinstance(item, Joint) else "Equation"
+    kind = item.type_name if isinstance(item, Joint) else "Equation"
     return ConstraintEntry(
         item.name, kind, first_row, item.equation_names, item.is_driver, item.text, item.source
     )
@@ -90,12 +99,8 @@ def gruebler(system: ConstraintSystem) -> Mobility:
 def _problem(system: ConstraintSystem, pattern: Pattern, ranks: RankReport) -> str:
     if least_squares_will_do(system, ranks):
         return ""
+    n, m = len(system.coordinates), len(system.equations)
     dependent = [system.equations[row] for row in sorted(ranks.partners)]
-    problem = counting_problem(system, pattern, dependent)
-    n = len(system.coordinates)
-    if not problem and ranks.rank < n:
-        return (
-            f"{system.name!r} has as many equations as coordinates, {n}, but at assembled "
-            f"positions only {ranks.rank} of them are independent: velocities are not determined"
-        )
-    return problem
+    # Where drivers are missing, nothing is said to be too many.
+    counted = counting_problem(system, pattern, dependent) if m <= n or ranks.rank == n else ""
+    return counted or (rank_problem(system, ranks) if ranks.rank < n else "")

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from kincompile.names import listed
+from kincompile.structure.remedies import advice
 from kincompile.tables import counted, indented, pose, table
 
 if TYPE_CHECKING:
@@ -110,14 +111,19 @@ def _mobility_lines(found: Findings) -> list[str]:
         (-count.joint_equations, "joint equations", ""),
         (count.degrees_of_freedom, "degrees of freedom", "by Gruebler's count"),
         (-count.driver_equations, "driver equations", drivers),
-        (count.undriven, "left over", _meaning(count.undriven)),
+        (count.undriven, "left over", _meaning(found)),
     ]
     width = max(len(str(number)) for number, _, _ in terms)
     rows = [[f"{number:{width}d}", what, note] for number, what, note in terms]
     return table(("", "", ""), rows)[1:]
 
 
-def _meaning(undriven: int) -> str:
+def _meaning(found: Findings) -> str:
+    """Return what the count means; the rank knows more where equations depend on others."""
+    undriven, free = found.mobility.undriven, found.degrees_of_freedom
+    if free and free != undriven:
+        depend = counted(len(found.redundant) + len(found.conflicting), "dependent equation")
+        return f"by rank {counted(free, 'degree')} of freedom: drivers are missing, {depend}"
     if not undriven:
         return ""
     return "drivers are missing" if undriven > 0 else "more equations than coordinates"
@@ -175,15 +181,13 @@ def _left(found: Findings) -> str:
 
 def _advice(found: Findings) -> Iterator[str]:
     """Yield what is wrong, and what to do."""
+    if found.missing_drivers:
+        yield f"{advice(found.missing_drivers)}."
     for item in found.surpluses[:EXPLAINED]:
         yield f"{item.text}. Remedy: {item.remedy}."
     if len(found.surpluses) > EXPLAINED:
         rest = listed(name for item in found.surpluses[EXPLAINED:] for name in item.equations)
         yield f"redundant or conflicting in the same way: {rest}."
-    if found.missing_drivers:
-        drivers = listed(item.text for item in found.missing_drivers)
-        what = "drivers are" if len(found.missing_drivers) > 1 else "a driver is"
-        yield f"{what} missing: add, for instance, {drivers}, as a function of kc.t."
     if not found.is_assembled:
         yield _unassembled(found)
     elif found.rank_at_start < found.rank:

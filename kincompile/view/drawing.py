@@ -180,7 +180,7 @@ def _labels(
     return tuple(
         JointLabel(
             item.name,
-            item.template.type_name if isinstance(item, Joint) else "Equation",
+            item.type_name if isinstance(item, Joint) else "Equation",
             places.get(item.name),
             item.is_driver,
             (first, len(item.equation_names)),

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.compiler import compile as compile_model
+from kincompile.emitters.templates import fill, read
 from kincompile.errors import InputError, KincompileWarning
 from kincompile.model.mechanism import system_of
 from kincompile.names import listed
 from kincompile.runtime.singular.assemblies import assemblies
 from kincompile.runtime.solve import solve
-from kincompile.targets.templates import fill, read
 from kincompile.view.drawing import drawing
 from kincompile.view.page_data import as_json
 from kincompile.view.page_scripts import WORLDS

@@ -18,7 +18,7 @@ from kincompile.view.marks import GROUND_FRAME, FramePoint, Span, moves_with, sh
 from kincompile.view.picture import colour_of
 from kincompile.view.shapes import HUES, mixed
 from kincompile.view.solid_picture import PLATE
-from kincompile.view.solids import InFrame, facets_of, solids
+from kincompile.view.solids import InFrame, beside, facets_of, solids
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -47,6 +47,9 @@ LEFT_OUT = ("turn", "push", "dimension", "gap")
 
 CONSTANT = 1e-9
 """Part of a length by which the length of a rod may vary."""
+
+OPPOSITE = 1e-12
+"""Angle [rad] short of half a turn at which any axis across will do: a better one is rounding."""
 
 
 def as_glb(
@@ -127,12 +130,12 @@ def _rod(file: _File, drawn: Drawing, mark: Span, q: Array) -> list[int]:
         first=FramePoint(GROUND_FRAME, (0.0, 0.0, 0.0)),
         second=FramePoint(GROUND_FRAME, (0.0, 0.0, longest)),
     )
-    turns = _turns_to(way / lengths[:, None])
+    turns = _turns_to(way)
     nodes = []
     for solid in solids(replace(drawn, marks=(mark,))):
         node = file.node(mark.joint, file.mesh(mark.joint, [solid], replace(solid, mark=upright)))
         is_driven = solid.piece.on != "barrel" and np.ptp(lengths) > CONSTANT * longest
-        scales = np.stack((lengths * 0 + 1, lengths * 0 + 1, lengths / longest), axis=-1)
+        scales = np.stack((lengths * 0 + 1, lengths * 0 + 1, lengths / (longest or 1.0)), axis=-1)
         file.animate(node, start, turns, scales if is_driven else None)
         nodes.append(node)
     return nodes
@@ -147,14 +150,23 @@ def _turned(q: Array, frame: BodyFrame) -> Array:
     return _continuous(np.stack((e1, e2, e3, e0), axis=-1))
 
 
-def _turns_to(axes: Array) -> Array:
-    """Return quaternions of the shortest turns from each axis to the next, the first from z."""
+def _turns_to(ways: Array) -> Array:
+    """Return quaternions of the shortest turns from each direction to the next, the first from z.
+
+    Where there is no direction, at a length of zero, the one before stays.
+    """
     found, here = [], np.array((0.0, 0.0, 0.0, 1.0))
     before = np.array((0.0, 0.0, 1.0))
-    for axis in axes:
+    for way in ways:
+        length = np.linalg.norm(way)
+        axis = way / length if length else before
+        if before @ axis < 0:  # right about, and back from there: what is left is small
+            across = np.cross(before, axis)
+            across -= across @ before * before
+            size = np.linalg.norm(across)
+            about = beside(before) if size < OPPOSITE else across / size
+            here, before = _after(np.append(about, 0.0), here), -before
         turn = np.append(np.cross(before, axis), 1 + before @ axis)
-        if turn[3] < 1e-12:  # right about, around any axis across
-            turn = np.array((1.0, 0.0, 0.0, 0.0))
         here = _after(turn / np.linalg.norm(turn), here)
         found.append(here)
         before = axis

@@ -6,16 +6,17 @@ import json
 from typing import TYPE_CHECKING
 
 import kincompile.compiler as compiler
+from kincompile.criteria import SOLVED
+from kincompile.emitters.emission import emit_program
+from kincompile.emitters.javascript.dialect import JAVASCRIPT
+from kincompile.emitters.javascript.target import RESERVED
+from kincompile.emitters.lines import indented, wrapped
+from kincompile.emitters.naming import NameTable
+from kincompile.emitters.printer import Printer
+from kincompile.emitters.schedule import Scheduler
 from kincompile.errors import ModelError, UnsupportedError
 from kincompile.ir.graph import Graph
 from kincompile.ir.inline import inline
-from kincompile.targets.emission import emit_program
-from kincompile.targets.javascript.dialect import JAVASCRIPT
-from kincompile.targets.javascript.target import RESERVED
-from kincompile.targets.lines import indented, wrapped
-from kincompile.targets.naming import NameTable
-from kincompile.targets.printer import Printer
-from kincompile.targets.schedule import Scheduler
 from kincompile.view.live_numbers import ANGLE, live_places
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def forces_script(model: Mechanism | ConstraintSystem) -> str:
     source = emit_program("javascript", inline(program)).source
     return (
         f"const forces = (() => {{\nconst module = {{ exports: {{}} }};\n{source}"
-        "return module.exports;\n})();\n"
+        f"return {{ ...module.exports, SOLVED: {SOLVED!r} }};\n}})();\n"
     )
 
 
@@ -81,10 +82,16 @@ def geometry_script(system: ConstraintSystem, drawing: Mapping[str, Any]) -> str
     """Return the script that declares `geometry`: what of a drawing depends on parameters.
 
     `places` are the ways to numbers in the drawing, and `numbers(0, p)` gives these. `profiles` has
-    the way to each curve, and the function of an angle and p that gives its radius.
+    the way to each curve, and the function of an angle and p that gives its radius. Corners of
+    hulls have no way: they are found again from the points attached.
     """
     names = [item.name for item in system.parameters]
-    found = list(live_places(drawing))
+    hulls = {k for k, mark in enumerate(drawing["marks"]) if mark["kind"] == "hull"}
+    found = [
+        (place, item)
+        for place, item in live_places(drawing)
+        if not (place[0] == "marks" and place[1] in hulls and place[2] == "points")
+    ]
     nodes = (node for _, item in found for node in item.graph.nodes)
     tables = sorted({str(node[1]) for node in nodes if node[0] == "table"})
     curves = [(place[:-1], item) for place, item in found if place[-1] == "rho"]

@@ -119,7 +119,9 @@ def seen_paths(drawn: Drawing, q: Array, camera: Camera) -> list[PicturePath]:
                 points = camera.seen(part.points)
                 depth = float(points[:, 2].mean()) + part.radius
                 found.append((depth, _path(solid, part, camera, points[:, :2])))
-    return [path for _, path in sorted(found, key=lambda item: item[0])]
+    # What differs by rounding errors alone keeps its order, on every processor.
+    farthest = max((abs(depth) for depth, _ in found), default=0.0) or 1.0
+    return [path for _, path in sorted(found, key=lambda item: round(item[0] / farthest, 9))]
 
 
 def all_parts(drawn: Drawing, q: Array) -> Iterator[tuple[Solid, Part]]:

@@ -39,7 +39,7 @@ BALL = 7
 """Facets of a ball from pole to pole."""
 
 FLAT = 1e-6
-"""Part of a body's size, and sine of an angle, up to which points are in a plane or on a line."""
+"""Part of a body's size up to which points are in a plane or on a line."""
 
 
 class Places(Protocol):
@@ -212,7 +212,7 @@ def _from(line: _Line, far: float) -> _Line:
 def beside(axis: Array) -> Array:
     """Return a unit vector at a right angle: to the coordinate axis that is farthest from it."""
     across = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    return np.asarray(across / np.linalg.norm(across))
+    return _unit(across)
 
 
 def _flat(corners: Array, line: _Line, piece: Piece, size: float) -> Part:
@@ -292,23 +292,57 @@ def wires(
 
 
 def _faces(places: Array) -> list[tuple[tuple[int, ...], Array]]:
-    """Return the points of each face of a hull, by number, and its normal to the outside."""
-    near = FLAT * float(np.max(np.linalg.norm(places - places[0], axis=1), initial=0.0))
-    found: dict[tuple[tuple[int, ...], tuple[float, ...]], Array] = {}
-    for i, j, k in itertools.combinations(range(len(places)), 3):
-        u, v = places[j] - places[i], places[k] - places[i]
-        normal = np.cross(u, v)
-        if np.linalg.norm(normal) <= FLAT * np.linalg.norm(u) * np.linalg.norm(v):
+    """Return the points of each face of a hull, by number, and its normal to the outside.
+
+    Points nearer to each other, to a line or to a plane than `FLAT` of their size are one, on it.
+    """
+    apart = np.linalg.norm(places[:, None] - places, axis=2)
+    near = FLAT * float(np.max(apart[0], initial=0.0))
+    own = np.flatnonzero(~np.tril(apart <= near, -1).any(axis=1))
+    corners = _spanning(places[own] - places[0], near)
+    if len(corners) < 3:
+        return []
+    if len(corners) == 3:
+        first, *others = places[own[corners]]
+        normal = _unit(np.cross(*(others - first)))
+        return [(tuple(own.tolist()), normal), (tuple(own.tolist()), -normal)]
+    found: list[tuple[frozenset[int], Array]] = []
+    for triangle, normal in _triangles(places[own]):
+        corners = own[triangle].tolist()
+        if any(on.issuperset(corners) and normal @ other > 0 for on, other in found):
             continue
-        normal /= np.linalg.norm(normal)
-        ways = (places - places[i]) @ normal
-        on = tuple(np.flatnonzero(np.abs(ways) <= near).tolist())
-        for outward in (normal, -normal):
-            is_outside = ((places - places[i]) @ outward <= near).all()
-            known = (other for (points, _), other in found.items() if points == on)
-            if is_outside and all(outward @ other <= 0 for other in known):
-                found[on, tuple(outward.tolist())] = outward
-    return [(on, normal) for (on, _), normal in found.items()]
+        ways = (places[own] - places[corners[0]]) @ normal
+        found.append((frozenset(own[np.abs(ways) <= near].tolist()), normal))
+    return sorted(((tuple(sorted(on)), normal) for on, normal in found), key=lambda face: face[0])
+
+
+def _spanning(places: Array, near: float) -> list[int]:
+    """Return up to four points, each the farthest from what those before it span."""
+    found, axes = [0], np.zeros((0, 3))
+    while len(found) < 4:
+        ways = places - places[0]
+        ways -= ways @ axes.T @ axes
+        far = np.linalg.norm(ways, axis=1)
+        if not far.max() > near:
+            break
+        found.append(int(np.argmax(far)))
+        axes = np.vstack((axes, ways[found[-1]] / far.max()))
+    return found
+
+
+def _triangles(places: Array) -> Iterator[tuple[list[int], Array]]:
+    """Yield triangles of a hull, with their normals to the outside, the largest first."""
+    from scipy.spatial import ConvexHull
+
+    hull = ConvexHull(places - places[0])
+    first, second, third = np.moveaxis(places[hull.simplices], 1, 0)
+    areas = np.linalg.norm(np.cross(second - first, third - first), axis=1)
+    for k in np.argsort(-areas, kind="stable"):
+        yield hull.simplices[k].tolist(), hull.equations[k, :3]
+
+
+def _unit(vector: Array) -> Array:
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def _ends(points: Sequence[Point], places: Array) -> tuple[Point, Point]:

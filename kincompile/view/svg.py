@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.targets.templates import read
+from kincompile.emitters.templates import read
 from kincompile.view.marks import GROUND_FRAME, moves_with
 from kincompile.view.polylines import Polyline, polylines
 from kincompile.view.shapes import DASHES, FILL, HUES, mixed

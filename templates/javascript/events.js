@@ -214,8 +214,8 @@ function explain(motion) {
     const { failed, status } = motion, event = failed && !failed.isExhausted ? endOf(motion) : null;
     if (!event || failed.position || failed.status === NOT_FINITE) return event;
     const isThere = Math.abs(event.t - failed.t) <= AT_EVENT * Math.max(Math.abs(event.t), Math.abs(failed.t));
-    const isSingular = event.kind === "bifurcation" || (event.kind === "lock-up" && isThere);
-    status[failed.index] = failed.status = isSingular ? SINGULAR : NOT_CONVERGED;
+    const reached = event.kind === "lock-up" && !isThere ? LOCK_UP : SINGULAR;
+    status[failed.index] = failed.status = event.kind === "branch switch" ? NOT_CONVERGED : reached;
     return event;
 }
 

@@ -8,6 +8,7 @@ class March {
         this.residual = Math.max(ASSEMBLED, ROUNDING);
         const vector = () => new Float64Array(equations.n);
         [this.change, this.predicted, this.rounding, this.expected] = [vector(), vector(), vector(), vector()];
+        this.missing = new Float64Array(equations.m);
         this.sides = equations.magnitude.map((x, i) => x * equations.probe[i]);
     }
 
@@ -67,7 +68,25 @@ class March {
             sum += at.q_dot[k] + at.q_ddot[k];
         }
         if (!(at.sensitivity < SINGULAR_SENSITIVITY)) return whySingular(at);
-        return Number.isFinite(sum) ? CONVERGED : NOT_FINITE;
+        if (!Number.isFinite(sum)) return NOT_FINITE;
+        return this.areMet(at) ? CONVERGED : SINGULAR;
+    }
+
+    /* Whether velocity and acceleration meet Phi_q x = b: elimination with pivots chosen beforehand may
+       lose all digits. Accelerations are measured by the square of the velocities too, which gamma
+       is made of. */
+    areMet(at) {
+        const { equations } = this, { PATTERN } = equations.model, { m, none } = equations;
+        const terms = equations.terms(at, equations.reference), missing = this.missing;
+        const speed = equations.distance(at.q_dot, none), growth = equations.distance(at.q_ddot, none) + speed * speed;
+        for (const [x, b, size] of [[at.q_dot, at.nu, speed], [at.q_ddot, at.gamma, growth]]) {
+            for (let i = 0; i < m; i += 1) missing[i] = -b[i];
+            for (let k = 0; k < PATTERN.length; k += 1) missing[PATTERN[k][0]] += at.Phi_q[k] * x[PATTERN[k][1]];
+            for (let i = 0; i < m; i += 1) {
+                if (!(Math.abs(missing[i]) <= equations.parts[i] * terms[i] * size)) return false;
+            }
+        }
+        return true;
     }
 
     /* Take a step from a good point: `to` counts only where it continues the motion. `to.isThere`
@@ -134,6 +153,18 @@ class March {
 
 /* ---- the whole grid ---- */
 
+/* A guess with Euler parameters of a length near one: any length is an orientation. By their largest
+   first, since the squares of large ones overflow. */
+function oriented(model, guess) {
+    const q = Float64Array.from(guess);
+    for (const [, first] of model.BODIES.filter(body => body[2] === SPATIAL_COORDINATES)) {
+        const p = q.subarray(first + 3, first + 7), most = Math.max(...p.map(Math.abs));
+        const rest = Math.sqrt(p.reduce((sum, x) => sum + (x / most) ** 2, 0)), length = most * rest;
+        if (length > LONGEST_P || length < 1 / LONGEST_P) p.forEach((x, k) => { p[k] = x / most / rest; });
+    }
+    return q;
+}
+
 /* The times at which the velocity of a driver jumps, as the runtime finds them. */
 function cornersOf(model, times, p, guess) {
     if (!model.CORNERS) return times.map(() => 0);
@@ -159,6 +190,7 @@ function motionOver(model, times, p = model.DEFAULTS, guess = model.GUESS) {
         status: new Int32Array(count).fill(NOT_REACHED), iterations: new Int32Array(count),
         failed: null, near: [], other: null, strays: false,
     };
+    guess = oriented(model, guess);
     const corners = cornersOf(model, Float64Array.from(times), p, guess);
     const timeOf = k => times[k] + corners[k];
     let outcome = start(model, p, guess, timeOf(0));
@@ -223,7 +255,8 @@ function start(model, p, guess, t) {
     const rough = new Problem(model, p, guess, t);
     const attempt = assemble(rough, t, Float64Array.from(guess)), iterations = attempt.corrections.length;
     if (attempt.status !== CONVERGED) {
-        return { status: attempt.status, iterations, equations: rough, state: null, position: null, nearest: attempt.last };
+        const status = attempt.status === NOT_CONVERGED ? NOT_ASSEMBLED : attempt.status;
+        return { status, iterations, equations: rough, state: null, position: null, nearest: attempt.last };
     }
     const march = new March(rough), at = attempt.last;
     march.isDense = true;

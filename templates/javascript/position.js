@@ -58,12 +58,14 @@ class Problem {
         Object.assign(this, { model, p, n, m });
         // Euler parameters, the last of a body in space, are cosines and sines of half angles.
         const ofEuler = ([, first, count], k) => count === SPATIAL_COORDINATES && k >= first + 3 && k < first + count;
-        this.angular = model.COORDINATES.map((name, k) => {
-            return model.UNITS[name] === "rad" || model.BODIES.some(body => ofEuler(body, k));
+        const isAngle = name => model.UNITS[name] === "rad";
+        this.angular = model.COORDINATES.map((name, k) => isAngle(name) || model.BODIES.some(body => ofEuler(body, k)));
+        this.covers = model.BODIES.filter(body => body[2] === SPATIAL_COORDINATES).map(([, first]) => {
+            return [3, 4, 5, 6].map(k => first + k);
         });
         const isOwned = k => model.BODIES.some(([, first, count]) => k >= first && k < first + count);
         this.mayTurn = model.COORDINATES.map((name, k) => {
-            return this.angular[k] || (model.UNITS[name] === "" && !isOwned(k));
+            return isAngle(name) || (model.UNITS[name] === "" && !isOwned(k));
         });
         this.size = rounded(sizeOf(model, this.angular, x => this.evaluate(x, t), Array.from(q))) || 1;
         this.reference = Float64Array.from(this.angular, isAngle => (isAngle ? 1 : this.size));
@@ -76,6 +78,9 @@ class Problem {
         this.noise = new Float64Array(m);
         this.limit = new Float64Array(m).fill(Infinity);
         this.sums = new Float64Array(m);
+        this.none = new Float64Array(n);
+        // By what part of their terms equations of rates may be missed.
+        this.parts = Float64Array.from(model.EQUATIONS, name => ((model.REDUNDANT ?? []).includes(name) ? AGREEMENT : SOLVED));
         const generic = this.evaluate(this.place.map((_, k) => q[k] + this.reference[k] * this.probe[k]), t);
         if (!allFinite(generic.Phi) || !allFinite(generic.Phi_q)) return;
         const own = this.terms(generic, this.reference).map(rounded);
@@ -146,19 +151,39 @@ class Problem {
         return most;
     }
 
+    /* The way from a guess to a position as a mechanism shows it: whole turns of an angle are no
+       way, and Euler parameters p and -p are one orientation. */
+    apart(q, guess) {
+        const turns = (x, k) => (this.angular[k] ? 2 * Math.PI * Math.round(x / (2 * Math.PI)) : 0);
+        const way = Float64Array.from(q, (x, k) => x - guess[k] - turns(x - guess[k], k));
+        for (const cover of this.covers) {
+            const along = cover.reduce((sum, k) => sum + q[k] * guess[k], 0);
+            for (const k of cover) way[k] = along < 0 ? q[k] + guess[k] : q[k] - guess[k];
+        }
+        return way;
+    }
+
+    /* How long that way is, in scales. */
+    away(q, guess, scale = this.near) {
+        return largest(this.apart(q, guess).map((x, k) => x / scale[k]));
+    }
+
     isFar(q, guess) {
-        return this.mayTurn.some((may, k) => may && Math.abs(q[k] - guess[k]) > FAR);
+        const way = this.apart(q, guess);
+        return this.mayTurn.some((may, k) => may && Math.abs(way[k]) > FAR);
     }
 
     /* Whether a guess shows a branch, and a position found from it lies on another. */
     leavesBranch(guess, found) {
+        if (this.model.REDUNDANT) return false;  // nothing has a determinant but the others' rows
         const wanted = this.determinants(guess), here = this.determinants(found);
-        return wanted.every(x => x !== 0) && wanted.some((x, k) => Math.sign(x) !== Math.sign(here[k]));
+        const shows = wanted.every((x, k) => x !== 0 && !(Math.abs(x) <= FOLDED * Math.abs(here[k])));
+        return shows && wanted.some((x, k) => Math.sign(x) !== Math.sign(here[k]));
     }
 
     /* Whether a position found from a guess is not what the guess shows. */
     strays(guess, found) {
-        const isFar = this.isFar(found.q, guess.q) || this.distance(found.q, guess.q, this.near) > ASTRAY;
+        const isFar = this.isFar(found.q, guess.q) || this.away(found.q, guess.q) > ASTRAY;
         return isFar || this.leavesBranch(guess, found);
     }
 
@@ -200,10 +225,10 @@ const moved = (equations, at, step, part = 1) => {
     return allFinite(following.Phi) ? following : null;
 };
 
-/* The whole correction. */
+/* The whole correction; of redundant equations that which misses all of them least. */
 function plainStep(equations, at) {
-    const factors = equations.factors(at), right = independent(equations.model, at.Phi);
-    const step = solve(factors, right.map(value => -value));
+    const { model } = equations, factors = equations.factors(at), right = at.Phi.map(value => -value);
+    const step = model.REDUNDANT ? leastSquares(model.rows_of(at, "Phi_q"), right) : solve(factors, right);
     if (factors.dependent.length || !allFinite(step)) return whySingular(at);
     const following = moved(equations, at, step);
     return following ? [following, norm(step)] : NOT_FINITE;
@@ -252,26 +277,62 @@ function iterate(equations, t, guess, most = MAX_ITERATIONS, step = plainStep) {
    the assembly on the other side of the nearest singular position is looked at too. `other` is
    another one that is as near to the guess. */
 function assemble(equations, t, guess) {
-    const away = q => equations.distance(q, guess, equations.near);
     const plain = iterate(equations, t, guess), isFound = plain.status === CONVERGED;
-    if (!plain.last || (isFound && away(plain.last.q) <= SETTLED)) return plain;
-    let good = [plain];
-    if (!isFound || equations.strays(plain.points[0], plain.last)) {
-        const attempts = safeguarded(equations, t, guess, isFound);
-        good = ordered(equations, plain.points[0], [plain, ...attempts]);
+    if (!plain.last || (isFound && equations.distance(plain.last.q, guess, equations.near) <= SETTLED)) return plain;
+    const meant = turned(equations, plain.points);
+    if (meant) {
+        const attempt = assemble(equations, t, meant);
+        if (attempt.status === CONVERGED) attempt.last = unwound(equations, t, attempt.last, guess);
+        return attempt;
+    }
+    const away = q => equations.away(q, guess);
+    const isSound = isFound && !isThrown(equations, plain.points);
+    let good = ordered(equations, plain.points[0], [plain]);
+    if (!isSound || equations.strays(plain.points[0], plain.last)) {
+        const attempts = safeguarded(equations, t, guess, isSound);
+        const found = ordered(equations, plain.points[0], isSound ? [plain, ...attempts] : attempts);
+        if (found.length) good = found;
         if (!good.length) return leastMissed(equations, attempts);
     }
     const mirrored = equations.otherSide(good[0].last), near = Math.max(1, away(good[0].last.q));
     if (mirrored && away(mirrored) <= MIRRORED * near) {
         const beyond = iterate(equations, t, mirrored);
-        if (beyond.last && away(beyond.last.q) <= Math.min(AS_NEAR * near, MIRRORED)) {
+        if (beyond.last && !isThrown(equations, beyond.points) && away(beyond.last.q) <= Math.min(AS_NEAR * near, MIRRORED)) {
             good = ordered(equations, plain.points[0], [...good, beyond]);
         }
     }
     const [first, ...rest] = good, reach = AS_NEAR * away(first.last.q);
-    const isOther = q => equations.distance(q, first.last.q) > SAME_POSITION && away(q) <= reach;
+    const isOther = q => equations.away(q, first.last.q, equations.reference) > SAME_POSITION && away(q) <= reach;
     first.other = rest.find(({ last }) => isOther(last.q))?.last ?? null;
     return first;
+}
+
+/* Whether a way went so far that rounding errors decide where it ends. */
+function isThrown(equations, way) {
+    return way.some(at => !(equations.distance(at.q, way[0].q, equations.near) <= THROWN));
+}
+
+/* A guess with angles turned by whole turns towards its first correction, where the equations say
+   which turn is meant and miss less then; null where there is none. */
+function turned(equations, way) {
+    const weights = equations.weights(), missed = ({ Phi }) => norm(weights.map((x, i) => x * Phi[i]));
+    const turns = way[0].q.map((x, k) => Math.round((way[Math.min(1, way.length - 1)].q[k] - x) / (2 * Math.PI)));
+    let guess = way[0];
+    const at = (some, count) => {
+        return equations.evaluate(guess.q.map((x, k) => x + (some.includes(k) ? 2 * Math.PI * count(k) : 0)), guess.t);
+    };
+    const isBound = k => {
+        const { Phi } = at([k], () => 1);
+        return !(norm(weights.map((x, i) => x * (Phi[i] - guess.Phi[i]))) <= SAME_POSITION);
+    };
+    const columns = [...turns.keys()].filter(k => equations.angular[k] && turns[k] && isBound(k));
+    for (const some of [columns, ...(columns.length <= MOST_TURNED ? columns.map(k => [k]) : [])]) {
+        const other = at(some, k => turns[k]);
+        if (!(missed(other) < (1 - SUFFICIENT) * missed(guess))) continue;
+        guess = other;
+        for (const k of some) turns[k] = 0;
+    }
+    return guess === way[0] ? null : Float64Array.from(guess.q);
 }
 
 /* Safeguarded attempts, from further and further away until one converges. */
@@ -299,9 +360,9 @@ function ordered(equations, guess, attempts) {
     const good = attempts.filter(({ status }) => status === CONVERGED);
     const orders = new Map(good.map(attempt => {
         const at = attempt.last = unwound(equations, guess.t, attempt.last, guess.q);
-        const away = +equations.distance(at.q, guess.q, equations.near).toFixed(6);
+        const away = +equations.away(at.q, guess.q).toFixed(6);
         const isFar = equations.isFar(at.q, guess.q), leaves = !isFar && equations.leavesBranch(guess, at);
-        return [attempt, [Math.min(away, 1), isFar, leaves, +equations.distance(at.q, guess.q).toFixed(6)]];
+        return [attempt, [Math.min(away, 1), isFar, leaves, +equations.away(at.q, guess.q, equations.reference).toFixed(6)]];
     }));
     return good.sort((one, other) => {
         const [a, b] = [orders.get(one), orders.get(other)], k = a.findIndex((x, i) => x !== b[i]);
@@ -320,6 +381,19 @@ function unwound(equations, t, at, guess) {
         if (q.every((x, k) => x === at.q[k])) continue;
         const turned = iterate(equations, t, q, MAX_CORRECTIONS);
         if (turned.status === CONVERGED && equations.distance(turned.last.q, q) <= SAME_POSITION) at = turned.last;
+    }
+    return covered(equations, t, at, guess);
+}
+
+/* Give Euler parameters the signs of a guess's, as far as the equations allow it. Where they are as
+   far from it either way, the largest one becomes positive. */
+function covered(equations, t, at, guess) {
+    for (const cover of equations.covers) {
+        const along = cover.reduce((sum, k) => sum + at.q[k] * guess[k], 0);
+        const most = cover.reduce((best, k) => (Math.abs(at.q[k]) > Math.abs(at.q[best]) ? k : best));
+        if ((Math.abs(along) > SAME_POSITION ? along : at.q[most]) >= 0) continue;
+        const other = equations.evaluate(at.q.map((x, k) => (cover.includes(k) ? -x : x)), t);
+        if (allFinite(other.Phi) && equations.holds(other, ASSEMBLED)) at = other;
     }
     return at;
 }

@@ -4,6 +4,7 @@
    columns.groups()     [{ title, items: [{ label, unit, isLog, values() }] }], what the model names first
    columns.find(label)  one of them; 'path of P' has `path`, the labels of its two columns */
 
+const LARGEST = 1e300;  // number whose differences are finite too
 const RATES = [['', ''], ['_dot', '/s'], ['_ddot', '/s²']];
 
 const columns = {
@@ -49,8 +50,9 @@ const columns = {
   },
 };
 
+/* A number that has a place on an axis, else null. */
 function finite(value) {
-  return Number.isFinite(value) ? value : null;
+  return Math.abs(value) < LARGEST ? value : null;
 }
 
 function entries(name, k, width) {

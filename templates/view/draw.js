@@ -18,6 +18,7 @@ const GROUND = { index: -1, columns: [] };  // a frame: a body's index, and its 
 const BARREL = 0.85;  // part of a cylinder's shortest length that its barrel has
 const SAME_POINT = 1e-9;  // relative distance up to which two points of a body are one
 const THICK = 8;  // pixels of a mark's size from which on lines grow with it
+const MOST_PIECES = 1000;  // of a line: one that has more goes off every screen
 const DASHES = { '': [], '--': [5, 4], ':': [4, 3] };
 
 function isGround(frame) {

@@ -24,7 +24,7 @@ const reactions = {
   /* Columns for plots: each force, and the polar plot of what a bearing bears. */
   items() {
     if (forces === null) return [];
-    const unit = name => forces.UNITS[name], shown = name => !/^(lambda|determinant)_/.test(name);
+    const unit = name => forces.UNITS[name], shown = name => !/^(lambda|determinant|missed)_/.test(name);
     const single = forces.OUTPUTS.filter(shown).map(name => ({
       label: name, unit: unit(name), values: () => this.column(forces.OUTPUTS.indexOf(name)),
     }));
@@ -47,10 +47,14 @@ const reactions = {
     return this.found;
   },
 
-  /* All forces in a state; NaN where there is no acceleration. */
+  /* All forces in a state; NaN where there is no acceleration, or the multipliers miss their
+     equations. */
   at({ q, q_dot, q_ddot, time, isFound }) {
-    if (!isFound) return forces.OUTPUTS.map(() => NaN);
-    return forces.outputs(q, q_dot, q_ddot, time, player.data.parameters.map(({ value }) => value));
+    if (isFound) {
+      const values = forces.outputs(q, q_dot, q_ddot, time, player.data.parameters.map(({ value }) => value));
+      if (values[forces.OUTPUTS.indexOf('missed_by_solves')] <= forces.SOLVED) return values;
+    }
+    return forces.OUTPUTS.map(() => NaN);
   },
 
   components(values, columns) {

@@ -5,7 +5,9 @@
    live.set({ r: 0.12 })  solve again with these values, the others as they are
    live.reset()           back to what the page was made with */
 
-const PARTS = 50;  // the mechanism's diagonal in sizes of marks, as in kincompile/view/drawing.py
+// As in kincompile/view/drawing.py: the mechanism's diagonal, and how far a guide is longer than the motion, in sizes of marks.
+const PARTS = 50;
+const OVERHANG = 3;
 const REST = 120;  // milliseconds without a pull after which what takes longer is looked for
 
 /* ---- drawing: numbers that depend on parameters or on the motion ---- */
@@ -34,12 +36,11 @@ function fitDrawing(drawing, motion) {
   const positions = [];
   for (let k = 0; k < motion.count; k++) if (motion.isFound(k)) positions.push(motion.row('q', k));
   if (!positions.length) positions.push(motion.solved(0).q);
-  const relative = drawing.overhang / drawing.size;
   drawing.overhang = 0;
   fitMarks(motion);
   const box = boxOf(drawing.marks, positions);
   drawing.size = (Math.hypot(...AXES.map((_, k) => box[2 * k + 1] - box[2 * k])) || 1) / PARTS;
-  drawing.overhang = relative * drawing.size;
+  drawing.overhang = OVERHANG * drawing.size;
   fitMarks(motion);
   const pad = 2 * drawing.size;
   return boxOf(drawing.marks, positions).map((x, k) => (k % 2 ? x + pad : x - pad));
@@ -91,7 +92,7 @@ function verdictOf(motion, event) {
     const reached = position ? '' : filled(words.followed, { t: brieflyNumber(state.t) });
     parts.push(`${before}${reached}.`);
   }
-  if (!state && status === 1) parts.push(words['not assembled']);
+  if (status === 6) parts.push(words['not assembled']);
   else if (failed.isExhausted) parts.push(words.exhausted);
   else parts.push(event ? event.message : general);
   if (position) parts.push(words.found);
@@ -148,12 +149,10 @@ function residualsOf(Phi) {
 /* ---- the panel ---- */
 
 const live = {
-  motion: null,  // the last one that the page solved for
+  made: null,  // what of the data depends on the motion, as the page was made
+  motion: null,  // the one shown, where the page solved for it; null for the one it was made with
+  isChanged: false,  // whether a slider was pulled
   ghost: null,  // { drawing, arrays }: a motion kept to compare with
-
-  get isChanged() {
-    return this.motion !== null;
-  },
 
   get names() {
     return player.data.parameters.map(({ name }) => name);
@@ -165,7 +164,6 @@ const live = {
     if (!parameters.length) return;
     this.given = parameters.map(({ value }) => value);
     this.values = this.given.slice();
-    this.panel = panel;
     const title = document.createElement('h2');
     title.textContent = 'Parameters';
     panel.append(title);
@@ -181,6 +179,11 @@ const live = {
     this.rows = parameters.map((parameter, k) => this.row(grid, parameter, k));
     this.verdict = document.createElement('output');
     panel.append(grid, this.buttons(), this.verdict);
+    const { arrays, status, events, success, message, guessResidual } = player.data;
+    this.made = { arrays, status, events, success, message, guessResidual };
+    // The first drawing has the very numbers that a Reset gives.
+    setNumbers(player.data.drawing, this.given);
+    this.fit();
     this.readFragment();
     setTimeout(() => this.motionNow(), REST);  // the first pull is not the first solve: that takes longer
     addEventListener('hashchange', () => this.readFragment());
@@ -239,12 +242,10 @@ const live = {
 
   /* The motion shown, as the solver gives it. */
   motionNow() {
-    this.first ??= this.motion ?? this.solved();
-    return this.motion ?? this.first;
+    return this.motion ?? (this.first ??= this.solved(this.given ?? []));
   },
 
-  solved() {
-    const p = player.data.parameters.map(({ value }) => value);
+  solved(p) {
     return emitted.solver.solve(emitted, player.t, Float64Array.from(p), player.data.start);
   },
 
@@ -283,28 +284,33 @@ const live = {
   solve() {
     const begin = performance.now(), { data } = player;
     data.parameters.forEach((parameter, k) => { parameter.value = this.values[k]; });
-    const motion = this.motion = this.solved();
-    this.takeMotion(motion);
-    setNumbers(data.drawing, motion.p);
-    this.takeVerdict(null);
+    this.isChanged = true;
+    this.motion = this.values.every((value, k) => value === this.given[k]) ? null : this.solved(this.values);
+    clearTimeout(this.timer);
+    Object.assign(data, this.made);
+    setNumbers(data.drawing, this.values);
+    if (this.motion) {
+      this.takeMotion(this.motion);
+      this.takeVerdict(null);
+      this.timer = setTimeout(() => this.explain(), REST);
+    }
+    this.showVerdict();
     this.showValues();
     player.motionChanged();
     this.time = performance.now() - begin;
-    clearTimeout(this.timer);
-    this.timer = setTimeout(() => this.explain(), REST);
   },
 
   /* Make the drawing fit a motion; what was seen first stays in view. */
   fit() {
-    const { data } = player, base = this.base ??= data.extent;
-    const extent = fitDrawing(data.drawing, player);
-    data.extent = extent.map((x, k) => (k % 2 ? Math.max(x, base[k]) : Math.min(x, base[k])));
+    const { data } = player, extent = fitDrawing(data.drawing, player);
+    const farther = (x, y, k) => (k % 2 ? Math.max(x, y) : Math.min(x, y));
+    data.extent = stage.first.map((x, k) => (extent.every(Number.isFinite) ? farther(x, extent[k], k) : x));
   },
 
   /* Put a motion in the place of the one that is shown. */
   takeMotion(motion) {
     const { data } = player, names = ['q', 'q_dot', 'q_ddot', ...(data.outputs.length ? ['y', 'y_dot', 'y_ddot'] : [])];
-    for (const name of names) data.arrays[name] = motion[name];
+    data.arrays = { ...data.arrays, ...Object.fromEntries(names.map(name => [name, motion[name]])) };
     withChecks(data.arrays, motion);
     data.status = Array.from(motion.status);
     if (!hasMotion()) data.guessResidual = residualsOf(motion.equations.evaluate(data.guess, player.t[0]).Phi);
@@ -316,13 +322,17 @@ const live = {
     data.events = passed;
     data.success = !this.motion.failed && !wrong;
     data.message = [wrong, verdictOf(this.motion, passed[0]), doubtOf(this.motion)].filter(Boolean).join(' ');
-    this.verdict.textContent = data.message;
-    this.verdict.classList.toggle('failed', !data.success);
+  },
+
+  showVerdict() {
+    this.verdict.textContent = player.data.message;
+    this.verdict.classList.toggle('failed', !player.data.success);
   },
 
   /* Find out what ended the motion: that takes longer than a frame. */
   explain() {
     this.takeVerdict(emitted.solver.explain(this.motion));
+    this.showVerdict();
     player.data.status = Array.from(this.motion.status);
     if (player.data.events.length) player.motionChanged();
   },

@@ -4,13 +4,14 @@
 const newtonTables = (() => {
   const PLOT = { width: 340, height: 200, left: 34, right: 10, top: 10, bottom: 26 };
   const LOWEST = -17;  // log10 of the smallest number that is told from zero
+  const HIGHEST = 308;  // and of the largest one
   const MOST_DIGITS = 10;  // coordinates up to which a cell of Phi_q has room for its number
   const NEXT = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
 
   const brief = x => (x === 0 ? '0' : x.toExponential(0));
   const scientific = x => (Number.isFinite(x) ? x.toExponential(2) : '\u2013');
   const twoDigits = x => (Math.abs(x) < 0.01 ? brief(x) : +x.toPrecision(2));
-  const logarithm = x => Math.max(LOWEST, Math.log10(Math.abs(x)));
+  const logarithm = x => Math.max(LOWEST, Math.min(HIGHEST, Math.log10(Math.abs(x))));
 
   function row(cells) {
     const made = document.createElement('tr');

@@ -102,7 +102,7 @@ function pointsOfStroke(pen, mark, stroke) {
     const far = part * length + ahead * size;
     return pen.view.toScreen([start[0] + far * x - left * size * y, start[1] + far * y + left * size * x]);
   };
-  const last = stroke.every ? Math.max(length / size, stroke.every) : 1;
+  const last = stroke.every ? Math.min(Math.max(length / size, stroke.every), MOST_PIECES * stroke.every) : 1;
   for (let foot = stroke.every / 2; foot < last; foot += stroke.every || 1) {
     for (const corner of stroke.corners) {
       points.push(corner && placed(corner[0], corner[1] + foot, corner[2]));
@@ -179,7 +179,7 @@ function rounded(points, radius) {
 
 /* Corners repeated around a circle. */
 function around(pen, { corners, every }, { start, along, length }, size) {
-  const count = Math.max(8, Math.round(2 * Math.PI * length / (every * size))), points = [];
+  const count = Math.max(8, Math.min(Math.round(2 * Math.PI * length / (every * size)), MOST_PIECES)), points = [];
   const first = Math.atan2(along[1], along[0]);
   for (let k = 0; k < count; k++) {
     const c = Math.cos(first + 2 * Math.PI * k / count), s = Math.sin(first + 2 * Math.PI * k / count);

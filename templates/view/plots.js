@@ -68,7 +68,6 @@ class Plot {
   }
 
   redraw() {
-    if (!hasMotion()) return;
     this.read();
     const { width, height } = this.size = this.sizes();
     const type = Math.round(0.76 * stage.type);
@@ -89,7 +88,8 @@ class Plot {
   /* What of both axes is seen; in a path lengths are true. */
   ranges() {
     const { to } = this.scale = this.isLog ? scalesOf.log : scalesOf.linear;
-    const x = extentOf(this.x.filter((value, k) => value !== null && this.y[k] !== null));
+    // Time is shown whole, also where nothing was found.
+    const x = extentOf(this.x.filter((value, k) => value !== null && (this.isOverTime || this.y[k] !== null)));
     const isZoomed = !this.isPath && plots.range !== null;
     const [from, until] = isZoomed ? plots.range : x;
     const isSeen = (_, k) => this.x[k] >= from && this.x[k] <= until;
@@ -127,12 +127,17 @@ class Plot {
     for (const x of multiples(step_x, ...this.xRange)) {
       parts.push(line(this.px(x), top, this.px(x), low), text(this.px(x), low + 1.25 * type, 'middle', stepText(x, step_x)));
     }
-    for (const [y, label] of this.levels(type, step_x)) {
+    const isEmpty = !this.y.some((y, k) => y !== null && this.x[k] !== null);
+    for (const [y, label] of isEmpty ? [] : this.levels(type, step_x)) {
       parts.push(line(left, y, right, y), text(left - 5, y + 0.35 * type, 'end', label));
     }
     parts.push(text((left + right) / 2, low + 2.6 * type, 'middle', this.labels[0], { fill: palette.ink }));
     parts.push(text(0, 1.1 * type, 'start', this.labels[1], { fill: palette.ink }));
     parts.push(...this.eventLines(palette), this.curve(palette));
+    if (isEmpty) {
+      const said = hasMotion() ? 'No numbers were found.' : 'No position was found.';
+      parts.push(text((left + right) / 2, (top + low) / 2, 'middle', said, { fill: palette.bad }));
+    }
     this.now = svgElement('line', { y1: top, y2: low, class: 'now', stroke: palette.drive, 'stroke-width': 2 });
     this.dot = svgElement('circle', { r: 4.5, class: 'dot', fill: palette.paper, stroke: palette.drive, 'stroke-width': 2 });
     parts.push(this.now, this.dot);
@@ -180,7 +185,8 @@ class Plot {
   eventLines(palette) {
     if (!this.isOverTime) return [];
     const { top, low } = this.box;
-    return player.data.events.map(({ t }) => svgElement('line', { x1: this.px(t), x2: this.px(t), y1: top, y2: low,
+    const [from, to] = this.xRange, seen = player.data.events.filter(({ t }) => t >= from && t <= to);
+    return seen.map(({ t }) => svgElement('line', { x1: this.px(t), x2: this.px(t), y1: top, y2: low,
       stroke: palette.bad, 'stroke-dasharray': '5 4' }));
   }
 
@@ -310,11 +316,13 @@ function extentOf(values) {
   return values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
 }
 
-/* A range with room at both ends; a constant in the middle of one, not rounding errors blown up. */
+/* A range with room at both ends; a constant in the middle of one, not rounding errors blown up: zero
+   beside the largest number of its unit. */
 function opened([low, high], noise) {
   const middle = (low + high) / 2, half = (high - low) / 2;
   const least = Math.max(noise, 1e-9 * Math.abs(middle));
-  const wide = half <= least ? Math.max(Math.abs(middle) / 10, 10 * noise, 1e-9) : 1.08 * half;
+  const size = Math.abs(middle) > noise ? Math.abs(middle) / 10 : noise / ROUNDING_PART;
+  const wide = half <= least ? size || 1 : 1.08 * half;
   return [middle - wide, middle + wide];
 }
 
@@ -360,13 +368,9 @@ const plots = {
   list: [],
   width: 240,
   range: null,  // of the x axis that all plots but paths show; null for all
-  first: null,  // what is plotted when the page opens
+  isNew: true,  // whether the first plots wait for a motion to choose by
 
   build(panel) {
-    if (!hasMotion()) {
-      panel.append('There is no motion to plot.');
-      return;
-    }
     this.holder = document.createElement('div');
     const bar = document.createElement('div'), label = document.createElement('label');
     bar.className = 'bar';
@@ -378,8 +382,10 @@ const plots = {
     bar.append(label, buttonOf('All', () => this.zoom(null), 'All of the axis'));
     const more = buttonOf('Another plot', () => this.add(columns.groups()[0].items[0].label));
     more.id = 'another';
-    panel.append(bar, this.holder, more);
-    this.first = plottedFirst();
+    this.parts = [bar, this.holder, more];
+    this.nothing = document.createElement('p');
+    this.nothing.textContent = 'There is no motion to plot.';
+    panel.append(this.nothing, ...this.parts);
   },
 
   /* What plots can have along: the angles of bodies, the driven ones first, and outputs. */
@@ -401,13 +407,10 @@ const plots = {
     return isProjected() ? Math.max(150, (innerHeight - 18.5 * stage.type) / 3) : 12.5 * stage.type;
   },
 
-  /* The first plots are made when they can be seen: before, they have no width. */
+  /* Plots that are seen again may have another width. */
   show() {
-    const labels = this.first;
-    this.first = null;
     this.measure();
-    if (labels) labels.forEach(label => this.add(label));
-    else this.redraw();
+    this.redraw();
   },
 
   /* Take the room there is: asked once, since a browser lays out the page to answer. */
@@ -442,6 +445,13 @@ const plots = {
   },
 
   redraw() {
-    for (const plot of this.list) plot.redraw();
+    const isFirst = this.isNew && hasMotion();
+    this.isNew &&= !isFirst;
+    this.nothing.hidden = !this.isNew;
+    for (const part of this.parts) part.hidden = this.isNew;
+    if (isFirst) {
+      this.measure();
+      plottedFirst().forEach(label => this.add(label));
+    } else for (const plot of this.list) plot.redraw();
   },
 };

@@ -11,6 +11,7 @@ const LIGHT = [-0.42, 0.55, 0.72];  // to the right, up, and towards the viewer
 const SHADES = 16;
 const PIECE = 8;  // sizes, the longest part of a solid: what is nearer is drawn later
 const MARKS = 3;  // sizes that a mark reaches beyond its place
+const FLAT = 1e-6;  // part of a body's size up to which points are in a plane or on a line
 const EYE = 4.5;  // how far the eye is, in half diagonals of the extent
 const STANDARD = {  // azimuth of the viewer, and how high it stands
   front: [-Math.PI / 2, 0], side: [0, 0], top: [-Math.PI / 2, Math.PI / 2],
@@ -82,6 +83,8 @@ const orbit = {
   fitted: STANDARD.isometric,  // the direction for which all of it fits: turning does not change sizes
   isPerspective: false,
   reach: null,  // how far the motion goes from the middle of its extent, as fitted: to the side, and up
+  first: null,  // { marks, states, size } of the motion that the page was made with: it stays in view
+  spans: null,  // of that motion, as fitted
 
   /* Turn the drawing as it is dragged, in pixels. */
   pan(right, down) {
@@ -93,27 +96,31 @@ const orbit = {
   /* One of the standard views, all of it seen. */
   look(name) {
     [this.azimuth, this.height] = this.fitted = STANDARD[name];
-    this.reach = null;
-    this.measure();
+    this.spans = null;
+    this.forget();
     stage.fit();
   },
 
-  /* Find how far the motion goes; with what was found before, so that nothing jumps. */
-  measure() {
-    const { drawing, extent } = player.data, middle = middleOfExtent(extent), axes = axesSeenFrom(this.fitted);
-    const found = this.reach ?? [0, 0];
-    for (const [frame, point] of drawing.marks.flatMap(reachOf)) {
-      for (const { q } of isGround(frame) ? player.states.slice(0, 1) : player.states) {
-        const way = minus(inWorld(q, frame, point), middle);
-        for (const k of [0, 1]) found[k] = Math.max(found[k], Math.abs(product(way, axes[k])) + MARKS * drawing.size);
-      }
-    }
-    this.reach = found;
+  forget() {
+    this.reach = null;
+  },
+
+  /* Find how far this motion and the first one go from the middle of the extent. */
+  measured() {
+    const { drawing: { marks, size }, extent } = player.data, axes = axesSeenFrom(this.fitted).slice(0, 2);
+    const own = { marks, states: player.states, size };
+    this.first ??= { ...own, marks: structuredClone(marks) };
+    this.spans ??= spansOf(this.first, axes);
+    const spans = spansOf(own, axes), middle = middleOfExtent(extent);
+    return axes.map((axis, k) => {
+      const at = product(axis, middle), ends = [...this.spans[k], ...spans[k].filter(Number.isFinite)];
+      return Math.max(...ends.map(end => Math.abs(end - at)));
+    });
   },
 
   /* What has to be seen of an extent: of the motion's own, what is there, of another one all of it. */
   reachOf(extent) {
-    if (this.reach && extent.every((x, k) => x === player.data.extent[k])) return this.reach;
+    if (extent.every((x, k) => x === player.data.extent[k])) return this.reach ??= this.measured();
     const half = minus(extent.filter((_, k) => k % 2), middleOfExtent(extent));
     return axesSeenFrom(this.fitted).slice(0, 2).map(axis => product(axis.map(Math.abs), half));
   },
@@ -146,8 +153,6 @@ const orbit = {
     made.ariaPressed = 'false';
     bar.style.marginTop = '.5rem';
     document.getElementById('drawn').append(bar);
-    this.measure();
-    player.onMotion(() => this.measure());
     stage.canvas.addEventListener('contextmenu', event => event.preventDefault());
     for (const id of ['poles', 'centrodes']) document.getElementById(id).closest('label').hidden = true;
     const pointing = document.getElementById('pointing'), moves = 'moves the drawing';
@@ -214,6 +219,21 @@ function axesSeenFrom([azimuth, height]) {
   return [[-s, c, 0], [-b * c, -b * s, a], [a * c, a * s, b]];
 }
 
+/* From where to where marks go along axes, in all states, and MARKS sizes beyond. */
+function spansOf({ marks, states, size }, axes) {
+  const spans = axes.map(() => [Infinity, -Infinity]), beyond = MARKS * size;
+  for (const [frame, point] of marks.flatMap(reachOf)) {
+    for (const { q } of isGround(frame) ? states.slice(0, 1) : states) {
+      const place = inWorld(q, frame, point);
+      axes.forEach((axis, k) => {
+        const at = product(axis, place), [low, high] = spans[k];
+        spans[k] = [Math.min(low, at - beyond), Math.max(high, at + beyond)];
+      });
+    }
+  }
+  return spans;
+}
+
 /* Width by height of what is seen of an extent. */
 function proportions() {
   return 1.5;
@@ -238,7 +258,7 @@ function turnedSolid(corners, { start, axis, aside, length }, size, sides) {
       found.push({ points: isEnd ? points : points.reverse(), normal: isEnd ? axis : axis.map(x => -x), isRim: true });
       continue;
     }
-    const count = out0 === out1 ? Math.max(1, Math.ceil((far1 - far0) / (PIECE * size))) : 1;
+    const count = out0 === out1 ? Math.max(1, Math.min(Math.ceil((far1 - far0) / (PIECE * size)), MOST_PIECES)) : 1;
     for (let i = 0; i < count; i++) {
       const at = part => ring(far0 + part * (far1 - far0), out0 + part * (out1 - out0));
       const [low, high] = [at(i / count), at((i + 1) / count)], slope = (out0 - out1) / (far1 - far0);
@@ -292,8 +312,8 @@ function partsOf(q, mark, piece, size) {
   return linesOf(q, mark, on).flatMap(line => {
     if (!sides) return [flatPart(line, piece, size)];
     if (!every) return turnedSolid(corners, line, size, sides);
-    const found = [];
-    for (let foot = every / 2; foot < line.length / size; foot += every) {
+    const found = [], last = Math.min(line.length / size, MOST_PIECES * every);
+    for (let foot = every / 2; foot < last; foot += every) {
       found.push(...turnedSolid(corners.map(([part, ahead, out]) => [part, ahead + foot, out]), line, size, sides));
     }
     return found;
@@ -318,32 +338,65 @@ function wiresOf(points) {
 }
 
 /* Flat faces, each counterclockwise seen from outside, and their edges; of points on a line its ends,
-   of points in a plane both sides of it. */
+   of points in a plane both sides of it. Points nearer to each other, to a line or to a plane than FLAT
+   of their size are one, on it: as in kincompile/view/solids.py. */
 function wiresAround(points) {
-  const size = Math.max(...points.map(point => distanceBetween(point, points[0]))), faces = new Map();
-  const near = 1e-6 * size;
-  for (let i = 0; i < points.length; i++) {
-    for (let j = i + 1; j < points.length; j++) {
-      for (let k = j + 1; k < points.length; k++) {
-        const [u, v] = [minus(points[j], points[i]), minus(points[k], points[i])], normal = cross(u, v);
-        if (Math.hypot(...normal) <= 1e-6 * Math.hypot(...u) * Math.hypot(...v)) continue;
-        const outward = unitOf(normal), ways = points.map(point => product(minus(point, points[i]), outward));
-        const on = ways.flatMap((way, at) => (Math.abs(way) <= near ? [at] : []));
-        for (const sign of [1, -1]) {
-          if (ways.some(way => sign * way > near) || faces.has(`${on} ${sign}`)) continue;
-          faces.set(`${on} ${sign}`, { on, normal: outward.map(x => sign * x) });
-        }
-      }
-    }
+  const near = FLAT * Math.max(...points.map(point => distanceBetween(point, points[0])));
+  const own = [...points.keys()].filter(k => !points.slice(0, k).some(other => distanceBetween(other, points[k]) <= near));
+  const corners = spanningOf(points, own, near), [a, b, c] = corners;
+  if (corners.length < 3) return { faces: [], edges: points.length > 1 ? [endsOf(points)] : [] };
+  if (corners.length === 3) {
+    const { normal } = triangleOf(points, [a, b, c]);
+    return facesAndEdges(points, [1, -1].map(sign => ({ on: own, normal: normal.map(x => sign * x) })));
   }
-  if (!faces.size) return { faces: [], edges: points.length > 1 ? [endsOf(points)] : [] };
-  return facesAndEdges(points, distinct([...faces.values()]));
+  const faces = [], triangles = trianglesAround(points, own, corners, near);
+  for (const triangle of triangles.sort((one, other) => other.area - one.area)) {
+    const isPart = ({ on, normal }) => product(normal, triangle.normal) > 0 && triangle.corners.every(k => on.includes(k));
+    if (faces.some(isPart)) continue;
+    faces.push({ on: own.filter(k => Math.abs(beyond(points, triangle, k)) <= near), normal: triangle.normal });
+  }
+  const isBefore = (one, other) => {
+    const at = one.findIndex((k, place) => k !== other[place]);
+    return at < 0 ? one.length - other.length : one[at] - (other[at] ?? -1);
+  };
+  return facesAndEdges(points, faces.sort((one, other) => isBefore(one.on, other.on)));
 }
 
-/* Faces of the same points and side, once: three points of a face may give its normal both ways. */
-function distinct(faces) {
-  const isSame = (a, b) => `${a.on}` === `${b.on}` && product(a.normal, b.normal) > 0;
-  return faces.filter((face, k) => !faces.slice(0, k).some(other => isSame(face, other)));
+/* Up to four points, by number, each the farthest from what those before it span. */
+function spanningOf(points, own, near) {
+  const found = [own[0]], axes = [];
+  while (found.length < 4) {
+    const ways = own.map(k => axes.reduce((way, axis) => plus(way, axis, -product(way, axis)), minus(points[k], points[own[0]])));
+    const far = ways.map(way => Math.hypot(...way)), most = Math.max(...far), at = far.indexOf(most);
+    if (!(most > near)) break;
+    found.push(own[at]);
+    axes.push(unitOf(ways[at]));
+  }
+  return found;
+}
+
+function triangleOf(points, corners) {
+  const [a, b, c] = corners.map(k => points[k]), across = cross(minus(b, a), minus(c, a));
+  return { corners, normal: unitOf(across), area: Math.hypot(...across) };
+}
+
+/* How far a point is outside the plane of a triangle. */
+function beyond(points, { corners: [a], normal }, k) {
+  return product(minus(points[k], points[a]), normal);
+}
+
+/* The triangles of a hull, counterclockwise seen from outside: from four points on, the triangles that a
+   point sees give way to those between it and the edge of what it sees. */
+function trianglesAround(points, own, [a, b, c, d], near) {
+  const isBelow = beyond(points, triangleOf(points, [a, b, c]), d) < 0, [p, q, r] = isBelow ? [a, b, c] : [a, c, b];
+  let found = [[p, q, r], [q, p, d], [r, q, d], [p, r, d]].map(corners => triangleOf(points, corners));
+  for (const k of own) {
+    const seen = found.filter(triangle => beyond(points, triangle, k) > near);
+    const sides = new Map(seen.flatMap(({ corners: [i, j, l] }) => [[i, j], [j, l], [l, i]].map(side => [`${side}`, side])));
+    const edge = [...sides.values()].filter(([i, j]) => !sides.has(`${j},${i}`));
+    found = [...found.filter(triangle => !seen.includes(triangle)), ...edge.map(([i, j]) => triangleOf(points, [i, j, k]))];
+  }
+  return found;
 }
 
 function facesAndEdges(points, faces) {

@@ -2,6 +2,7 @@
 /* The canvas: what is drawn on it, and what a pointer does there.
 
    stage.view            world to screen, for the size the canvas has now
+   stage.first           extent of the motion that the page was made with: it stays in view
    stage.extent          function that gives what the picture must show
    stage.camera          null where all of it is seen, or { zoom, centre }
    stage.underlays       functions (ctx, view, palette, state) that draw below: a grid
@@ -23,6 +24,7 @@ class Stage {
   constructor(canvas) {
     this.canvas = canvas;
     this.ctx = canvas.getContext('2d');
+    this.first = player.data.extent;
     this.extent = () => player.data.extent;
     this.camera = null;
     this.underlays = [];
@@ -48,7 +50,7 @@ class Stage {
     this.type = fontSize();
     const width = this.canvas.parentElement.clientWidth;
     const most = Math.max(240, innerHeight - (isProjected() ? 11 : 18) * this.type);
-    const wanted = isProjected() ? most : Math.max(0.45 * width, width / proportions(player.data.extent) + 4 * NEAR);
+    const wanted = isProjected() ? most : Math.max(0.45 * width, width / proportions(this.first) + 4 * NEAR);
     const height = Math.max(220, Math.min(most, wanted));
     const dense = devicePixelRatio || 1;
     this.canvas.width = Math.round(width * dense);
@@ -68,6 +70,7 @@ class Stage {
     this.view = new View(this.extent(), this.width, this.height, NEAR, this.camera);
     const { ctx, view, palette } = this;
     ctx.clearRect(0, 0, this.width, this.height);
+    ctx.save();  // what a drawing sets is not left to the next one
     for (const underlay of this.underlays) underlay(ctx, view, palette, state);
     const violated = state.isFound ? null : violatedJoints();
     const largest = Math.max(9, Math.min(this.width, this.height) / 55);
@@ -79,6 +82,7 @@ class Stage {
     const point = this.hovered || this.selected;
     if (point && point.isBody) this.drawOutline(point, state, style);
     else if (point) this.drawPoint(point, state);
+    ctx.restore();
   }
 
   where(point, state) {

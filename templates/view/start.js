@@ -18,6 +18,10 @@ function showSizes() {
   byId('summary').textContent = (hasBodies ? sizes : sizes.slice(1)).join(', ');
 }
 
+function inShort({ kind, t, bodies }) {
+  return `${kind} at t = ${+t.toPrecision(6)}: ${bodies.join(', ')}`;
+}
+
 function showVerdict() {
   const { data } = player;
   // While sliders are pulled, the verdict is below them: nothing above them must move.
@@ -26,8 +30,7 @@ function showVerdict() {
   byId('events').replaceChildren();
   for (const event of data.events) {
     const item = document.createElement('li'), button = document.createElement('button');
-    const short = `${event.kind} at t = ${+event.t.toPrecision(6)}: ${event.bodies.join(', ')}`;
-    Object.assign(button, { type: 'button', textContent: short });
+    Object.assign(button, { type: 'button', textContent: inShort(event) });
     button.addEventListener('click', () => {
       player.pause();
       player.setTime(event.t);
@@ -39,16 +42,21 @@ function showVerdict() {
   }
 }
 
+const UNASSEMBLED = 'No position was found: with these values the mechanism cannot be assembled, or the guess is too far away. ';
+
 function showNote(state) {
   const note = byId('note'), { status, sentences } = player.data;
   const isGood = status[state.index] === 0;
   note.hidden = isGood;
   if (isGood) return;
   const shown = state.isFound ? '' : ' Shown is the last position that was found.';
+  // What ended the motion says more than that something did.
+  const [ended] = player.data.events.slice(-1), sentence = sentences[status[state.index]];
+  const said = status[state.index] === 4 && ended ? `${splitSentence(sentence)[0]}, after ${inShort(ended)}.` : sentence;
   note.textContent = hasMotion()
-    ? `t = ${+state.time.toPrecision(6)}: ${sentences[status[state.index]]}${shown}`
+    ? `t = ${+state.time.toPrecision(6)}: ${said}${shown}`
     : state.isFound ? 'Shown is the position at the start.'
-      : 'Shown is the start guess. Constraints that it violates are red.';
+      : `${[1, 6].includes(status[0]) ? UNASSEMBLED : ''}Shown is the start guess. Constraints that it violates are red.`;
 }
 
 /* ---- time ---- */
@@ -217,6 +225,7 @@ function start() {
   numbers.build(byId('panel-numbers'));
   byId('tab-measures').hidden = !player.data.outputs.length || 'reason' in emitted;
   measures.build(byId('panel-measures'));
+  live.build(byId('live'));
   if (hasBodies) {
     points.build(byId('panel-points'));
     stage.pointer = new Grab();
@@ -237,14 +246,13 @@ function start() {
   player.onMotion(forget);
   showPanel('plots');
   showing.theme();
-  live.build(byId('live'));
   if (player.data.angleUnit !== units.angle) showing.angles();
 }
 
 /* The motion is another one: what was computed from the last one is dropped. */
 function forget() {
   live.fit();
-  for (const keeper of [units, columns, poles, reactions, stage]) keeper.forget();
+  for (const keeper of [units, columns, poles, reactions, stage, ...(isSpatial ? [orbit] : [])]) keeper.forget();
   plots.redraw();
   showVerdict();
   markTimeline();

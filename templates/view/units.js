@@ -59,13 +59,13 @@ function digitsOf(value, scale) {
 /* The largest number of each unit among coordinates, outputs and their rates. */
 function largestOfUnits({ coordinates, outputs, arrays, lengthUnit, drawing }) {
   const scales = new Map([['s', Math.max(...player.t.map(Math.abs))]]);
-  const grow = (unit, value) => { if (value > (scales.get(unit) ?? 0)) scales.set(unit, value); };
+  const grow = (unit, value) => { if (value > (scales.get(unit) ?? 0) && value < LARGEST) scales.set(unit, value); };
   for (const [owners, name] of [[coordinates, 'q'], [outputs, 'y']]) {
     ['', '_dot', '_ddot'].forEach((order, k) => {
       const values = arrays[name + order] ?? [], most = new Float64Array(owners.length);
       for (let place = 0, at = 0; place < values.length; place++, at = at + 1 < most.length ? at + 1 : 0) {
         const size = Math.abs(values[place]);
-        if (size > most[at]) most[at] = size;
+        if (size > most[at] && size < LARGEST) most[at] = size;
       }
       owners.forEach(({ unit }, at) => grow(unit && unit + ['', '/s', '/s²'][k], most[at]));
     });

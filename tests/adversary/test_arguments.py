@@ -51,7 +51,9 @@ WRONG: dict[str, Callable[[Any], object]] = {
     "a distribution beside its limits": lambda r: kc.Deviation(-1, 1, LAWS.norm(3, 0.1)),
     "limits at no standard deviation": lambda r: kc.Deviation(-1, 1, sigmas=1e-300),
     "a sweep of nothing": lambda r: kc.sweep(r.m, None, target="numpy"),
-    "a measure that is a number": lambda r: kc.sweep(r.m, {"a": [1, 2]}, measures=[3]),
+    "a measure that is a number": lambda r: kc.sweep(
+        r.m, {"a": [1, 2]}, measures=[3], target="numpy"
+    ),
     "half a chunk": lambda r: kc.sweep(r.m, {"a": [1, 2]}, chunk=1.5),
     "a number as store": lambda r: kc.sweep(r.m, {"a": [1, 2]}, target="numpy", store=3),
     "a position that is a number": lambda r: kc.simulate(r.free, [0, 1], position=3),

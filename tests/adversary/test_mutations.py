@@ -15,10 +15,10 @@ import pytest
 
 import kincompile as kc
 from kincompile.model.origins import remember_model
-from kincompile.quantities import OF_EQUATIONS, functions, states_of
+from kincompile.quantities import functions, quantities_of, states_of
+from kincompile.runtime.engine.blocks import BlockSolver
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.engine.planned import Planned
-from kincompile.runtime.engine.stages import StagedSolver
 
 MACHINERY = {"inline": "class _Quantity", "grouped": "class Group"}
 """From here on all modules are alike: shapes, batches and messages."""
@@ -96,7 +96,27 @@ def stephenson():
     return m
 
 
-MODELS = {"coupled": coupled_four_bars, "stephenson": stephenson}
+def press(*, driven=True):
+    """Return a slider-crank with masses, a spring and an output; without a motor it is free."""
+    m = kc.Mechanism("press")
+    m.gravity = (0, -9.81)
+    a = m.parameter("a", 0.1)
+    crank = m.body("crank", (0, 0, 0.3), mass=1.2, inertia=0.002, centre=(0.04, 0.01))
+    rod = m.body("rod", (0.25, 0.02, 0), mass=0.8, inertia=0.006, centre=(0.02, 0.01))
+    ram = m.body("ram", (0.4, 0, 0), mass=1.5, inertia=0.001)
+    m.add(kc.Revolute("O", m.ground, (0, 0), crank, (0, 0)))
+    m.add(kc.Revolute("A", crank, (a, 0), rod, (-0.15, 0)))
+    m.add(kc.Revolute("B", rod, (0.15, 0), ram, (0, 0)))
+    m.add(kc.Translational("C", m.ground, (0, 0), (1, 0), ram, (0, 0), (1, 0)))
+    m.output("far", kc.outputs.distance(m.point("P", rod, (0.1, 0.1)), (1, 2)), "m")
+    given = {"stiffness": 150, "free_length": 0.15, "damping": 2}
+    m.add(kc.Spring("s", m.ground, (0.6, 0.1), ram, (0, 0), **given))
+    if driven:
+        m.add(kc.AbsoluteAngle("motor", crank, 0.3 + 10 * kc.t))
+    return m
+
+
+MODELS = {"coupled": coupled_four_bars, "stephenson": stephenson, "press": press}
 
 
 @pytest.fixture
@@ -113,9 +133,15 @@ def numbers(module):
     t, b = random.uniform(0, 2, 40), random.uniform(-1, 1, (40, module.N_EQUATIONS))
     p = module.DEFAULTS + random.uniform(0.1, 0.5, (40, module.DEFAULTS.size))
     nonzeros = module.Phi_q_nonzeros(q, t, p)
-    found = [nonzeros, module.solve(nonzeros, b), module.solve(nonzeros[3], b[3])]
+    found = [nonzeros]
+    if hasattr(module, "solve"):
+        found += [module.solve(nonzeros, b), module.solve(nonzeros[3], b[3])]
     found += module.kinematics_batch_last(q.T, q_dot.T, t, p.T)
-    for name, given in functions(OF_EQUATIONS).items():
+    given_of = functions(quantities_of(("loads", "motion") if hasattr(module, "LOADS") else ()))
+    if hasattr(module, "OUTPUTS"):
+        found += module.observe(q, q_dot, q_dot[::-1], t, p)
+        found.append(module.outputs_q(q, q_dot, q_dot[::-1], t, p))
+    for name, given in given_of.items():
         function = getattr(module, name)
         for at in (np.arange(40), 3):
             states = (q[at], q_dot[at])[: len(states_of(given))]
@@ -127,23 +153,28 @@ def numbers(module):
 def numbers_of_plan(module, q, t, p, nonzeros, b):
     """Yield what the planned solve gives to the runtime: solutions and determinants."""
     code = code_of(module)
-    if code.lanes is not None:
+    if code.lanes is not None and hasattr(module, "solve"):
         engine = Planned(code, p.T)
         point = engine.evaluate(q.T, t)
         yield from np.broadcast_arrays(*engine.solve(point, b.T), *engine.determinants(point))
-    if code.stages:
-        stages = StagedSolver(code)
+    if code.blocks:
+        solver = BlockSolver(code)
         for entries, right in zip(nonzeros[:5], b, strict=False):
-            factors = stages.factor(entries)
-            yield stages.solve(factors, right, checked=False)
-            yield stages.determinants(factors)
+            factors = solver.factor(entries)
+            yield solver.solve(factors, right)
+            yield solver.determinants(factors)
 
 
-def is_equivalent(module, known):
-    """Say whether a module computes the numbers that are known."""
+def is_equivalent(module, known, *, may_refuse=False):
+    """Say whether a module computes the numbers that are known, or NaN if it may refuse."""
     with np.errstate(all="ignore"):
         pairs = zip(numbers(module), known, strict=True)
-        return all(np.allclose(ours, theirs, 1e-9, 1e-11, equal_nan=True) for ours, theirs in pairs)
+        return all(
+            np.all(
+                np.isclose(ours, theirs, 1e-9, 1e-11, equal_nan=True) | may_refuse & np.isnan(ours)
+            )
+            for ours, theirs in pairs
+        )
 
 
 def verdict(path, mutant, system):
@@ -151,7 +182,8 @@ def verdict(path, mutant, system):
     path.write_text(mutant.source, encoding="utf-8")
     try:
         module = kc.load(path)
-        return not kc.verify(remember_model(module, system)).passed, module
+        known = module if system is None else remember_model(module, system)
+        return not kc.verify(known).passed, module
     except (ArithmeticError, ValueError, TypeError, IndexError):
         return True, None
 
@@ -162,6 +194,10 @@ EVERY = [
     *(("stephenson", "inline", 2), ("cam_flat_follower", "inline", 4)),
     *(("four_bar", "grouped", 1), ("coupled", "grouped", 2)),
 ]
+
+UNSEEN_OF_A_FILE = 3
+"""Turned signs of a module from a file that no oracle sees: values of outputs are believed, and so
+is M where it is multiplied by nothing, since an evenly driven crank has no acceleration."""
 
 
 def check_mutants(model, form, every, folder, record):
@@ -204,3 +240,33 @@ def test_that_the_plan_is_looked_at(example_named, tmp_path):
     wrong = [check.entry for check in found.table if not check.passed]
     assert wrong == ["solve of B.y", "solve of C.y"]  # where y_coupler occurs
     assert f"DIFFERS: {', '.join(wrong)}" in found.to_text()
+
+
+@pytest.mark.parametrize(
+    ("driven", "is_known", "every"),
+    [
+        pytest.param(driven, is_known, every, marks=[pytest.mark.slow] * (every == 1 or driven))
+        for driven, is_known in ((True, True), (False, True), (True, False), (False, False))
+        for every in (1, 120)
+    ],
+)
+def test_that_a_turned_sign_of_dynamics_is_found(driven, is_known, every, tmp_path, record):
+    """With the model at hand all are found; M and Q of a file may be wrong together with them.
+
+    A sign in the look at a solve may make it refuse what is right: then the numbers are NaN.
+    """
+    model = press(driven=driven)
+    kc.emit(model, dynamics=True).write(tmp_path)
+    path, system = tmp_path / "press.py", model.system() if is_known else None
+    original = kc.load(path)
+    assert kc.verify(remember_model(original, model.system())).passed
+    known, unseen, equivalent = numbers(original), [], 0
+    chosen = list(mutants(path.read_text(encoding="utf-8"), "inline"))[::every]
+    for mutant in chosen:
+        is_found, module = verdict(path, mutant, system)
+        if not is_found and is_equivalent(module, known, may_refuse=True):
+            equivalent += 1
+        elif not is_found:
+            unseen.append(f"{mutant.function}: {mutant.line}")
+    record(tried=len(chosen), wrong=0, gave_up=equivalent + len(unseen))
+    assert len(unseen) <= (0 if is_known else UNSEEN_OF_A_FILE), unseen

@@ -5,6 +5,7 @@ Every found position is compared with the closed form of the chain, which knows 
 
 import itertools
 import json
+import os
 import shutil
 import subprocess
 import warnings
@@ -13,9 +14,9 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.runtime.newton import iterate
-from kincompile.runtime.problem import THROWN, problem
-from kincompile.targets.templates import read
+from kincompile.emitters.templates import read
+from kincompile.runtime.corrector import iterate
+from kincompile.runtime.problem import problem
 from kincompile.view.page_scripts import solver_script
 from tests.adversary.chains import (
     Placement,
@@ -31,6 +32,8 @@ from tests.targets.conftest import OCTAVE, run_octave
 STRUCTURES = (("RRR",), ("RRP", "slot"), ("RRR", "gear", "RRR"), ("slot", "RRR", "RRP"))
 AT_START = np.zeros(1)
 NODE = shutil.which("node") or shutil.which("nodejs")
+SHARE = 1 if "ADVERSARY_REPORT" in os.environ else 5
+"""Part of the starts that the slow suite tries; `python -m tests.adversary` tries all."""
 
 
 def cases():
@@ -59,7 +62,10 @@ def solved(module, guess):
 
 
 def compare(count, record):
-    """Solve bad starts by NumPy and by C: what is found is an assembly, and the same in both."""
+    """Solve bad starts by NumPy and by C: what is found is an assembly, and the same in both.
+
+    Returns of how many nothing is found.
+    """
     tried = gave_up = other = 0
     for case, random in cases():
         modules = [kc.compile(case.model, target=target) for target in ("numpy", "c")]
@@ -76,6 +82,7 @@ def compare(count, record):
                     assert start_of(case, position) is not None, "no assembly of the closed form"
     record(tried=tried, wrong=other, gave_up=gave_up)
     assert other == 0
+    return gave_up
 
 
 @pytest.mark.slow
@@ -84,8 +91,8 @@ def test_a_few_bad_starts_in_c(quick_compiler, record):
 
 
 @pytest.mark.slow
-def test_two_thousand_bad_starts(quick_compiler, record):
-    compare(2000, record)
+def test_many_bad_starts(quick_compiler, record):
+    assert compare(2000 // SHARE, record) <= 40 / SHARE
 
 
 def under_node(folder, text, result):
@@ -111,35 +118,6 @@ def in_javascript(folder, model, t, guesses):
         yield np.array(status), np.array(q, dtype=float).reshape(len(status), -1), *rest
 
 
-def is_thrown(module, guess):
-    """Say whether plain steps go so far that the last digit of a sine decides where they end."""
-    equations = problem(module, module.DEFAULTS, guess, 0.0)
-    points = iterate(equations, 0.0, guess, 1e-10, 25).points
-    return max(equations.away(point.q, guess) for point in points) > THROWN
-
-
-def compare_in_javascript(count, folder, record):
-    """Solve bad starts in JavaScript: all is as in the runtime; return how many are not.
-
-    These are thrown so far that roundings decide where they end.
-    """
-    tried = other = 0
-    for case, random in cases():
-        module, guesses = kc.compile(case.model), bad_starts(case, random, count // len(STRUCTURES))
-        results = in_javascript(folder, case.model, 0.0, guesses)
-        for guess, (status, q, _, elsewhere, strays) in zip(guesses, results, strict=True):
-            known, q_known, said = solved(module, guess)
-            tried += 1
-            is_same = status[0] == known and np.allclose(q, q_known, 1e-9, 1e-9, equal_nan=True)
-            bodies = f"with {', '.join(elsewhere or ())} elsewhere, is as near to the guess"
-            is_same &= (bodies if elsewhere else "on another branch" if strays else "") in said
-            is_same &= bool(elsewhere or strays) == ("each serves as a guess" in said)
-            assert is_same or is_thrown(module, guess)
-            other += not is_same
-    record(tried=tried, wrong=0, gave_up=other)
-    return other
-
-
 def in_octave(folder, model, guesses):
     """Yield whether Octave's start finds a position from each guess, and the position."""
     kc.emit(model, "octave").write(folder)
@@ -158,35 +136,43 @@ def in_octave(folder, model, guesses):
 
 @pytest.mark.slow
 @pytest.mark.skipif(OCTAVE is None, reason="octave-cli is not installed (Debian: octave)")
-def test_two_thousand_starts_in_octave(tmp_path, record):
-    """All is as in the runtime, but what is thrown so far that roundings decide where it ends."""
-    tried = other = 0
+def test_many_starts_in_octave(tmp_path, record):
+    """All is as in the runtime."""
+    tried = gave_up = 0
     for number, (case, random) in enumerate(cases()):
-        module, guesses = kc.compile(case.model), bad_starts(case, random, 500)
+        module, guesses = kc.compile(case.model), bad_starts(case, random, 500 // SHARE)
         (folder := tmp_path / str(number)).mkdir()
         results = in_octave(folder, case.model, guesses)
         for guess, (is_found, q) in zip(guesses, results, strict=True):
             status, known, _ = solved(module, guess)
             is_same = is_found == (status == kc.Status.CONVERGED)
             is_same &= not is_found or np.allclose(q, known, 1e-9, 1e-9)
-            assert is_same or is_thrown(module, guess)
-            tried, other = tried + 1, other + (not is_same)
-    record(tried=tried, wrong=0, gave_up=other)
-    assert other <= 10
+            assert is_same
+            tried, gave_up = tried + 1, gave_up + (status != kc.Status.CONVERGED)
+    record(tried=tried, wrong=0, gave_up=gave_up)
 
 
 needs_node = pytest.mark.skipif(NODE is None, reason="node is not installed (Debian: nodejs)")
 
 
 @needs_node
-def test_a_few_bad_starts_in_javascript(tmp_path, record):
-    assert compare_in_javascript(40, tmp_path, record) == 0
-
-
-@needs_node
 @pytest.mark.slow
-def test_two_thousand_starts_in_javascript(tmp_path, record):
-    assert compare_in_javascript(2000, tmp_path, record) <= 20
+def test_many_starts_in_javascript(tmp_path, record):
+    """All is as in the runtime."""
+    tried = gave_up = 0
+    for case, random in cases():
+        module, guesses = kc.compile(case.model), bad_starts(case, random, 500 // SHARE)
+        results = in_javascript(tmp_path, case.model, 0.0, guesses)
+        for guess, (status, q, _, elsewhere, strays) in zip(guesses, results, strict=True):
+            known, q_known, said = solved(module, guess)
+            tried += 1
+            is_same = status[0] == known and np.allclose(q, q_known, 1e-9, 1e-9, equal_nan=True)
+            bodies = f"with {', '.join(elsewhere or ())} elsewhere, is as near to the guess"
+            is_same &= (bodies if elsewhere else "on another branch" if strays else "") in said
+            is_same &= bool(elsewhere or strays) == ("each serves as a guess" in said)
+            assert is_same
+            gave_up += known != kc.Status.CONVERGED
+    record(tried=tried, wrong=0, gave_up=gave_up)
 
 
 def motions_in_javascript(seeds, folder):
@@ -237,7 +223,7 @@ def test_two_hundred_bad_starts_on_the_page(tmp_path, record):
             last = np.array(found["iterates"][-1]["q"])
             np.testing.assert_allclose(last, known.points[-1].q, rtol=1e-6, atol=1e-6)
     record(tried=tried, wrong=0, gave_up=thrown)
-    assert tried - thrown >= 60
+    assert tried - thrown >= 80
 
 
 NEAR = np.pi / 6, 0.1
@@ -290,9 +276,9 @@ def come_home(count, record):
 
 
 def test_a_few_near_starts(record):
-    assert come_home(40, record) >= 0.99
+    assert come_home(20, record) == 1
 
 
 @pytest.mark.slow
 def test_that_near_starts_come_home(record):
-    assert come_home(1000, record) >= 0.99
+    assert come_home(1000 // SHARE, record) >= (0.997 if SHARE == 1 else 0.99)

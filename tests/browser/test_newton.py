@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.runtime.newton import iterate
+from kincompile.runtime.corrector import iterate
 from kincompile.runtime.problem import problem
 
 EXAMPLES = ("four_bar", "slider_crank", "wrecker_boom", "cam_flat_follower", "problem_3_5_6")

@@ -65,7 +65,7 @@ def test_that_inspect_tells_all_problems_with_lines(tmp_path):
         (b"\xff\xfe\x00", "line 1: this is not text in UTF-8"),
         (b"", "line 1: this is not a model for kincompile"),
         (b"kincompile = 1\nname = 'a'\nname = 'b'\n", "line 3: this is not TOML"),
-        (b"x" * 17_000_000, "the file has more than 16,000,000 bytes"),
+        (b"x" * 17_000_000, "the file has more than 8,000,000 bytes"),
     ],
 )
 def test_that_a_bad_file_leaves_nothing_behind(tmp_path, content, message):

@@ -18,7 +18,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kincompile as kc
-from kincompile.files.safe_expressions import ExpressionError, parse_expression
+from kincompile.files.formula_text import ExpressionError
+from kincompile.files.safe_expressions import parse_expression
 
 CORPUS = runpy.run_path(str(Path(__file__).with_name("corpus.py")))
 NAMES = {"t": sympy.Symbol("t"), "x": sympy.Symbol("x")}

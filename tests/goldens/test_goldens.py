@@ -17,10 +17,10 @@ import pytest
 import sympy
 
 import kincompile as kc
+from kincompile.emitters.registry import TARGETS
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.model.mechanism import system_of
-from kincompile.targets.registry import TARGETS
 
 ROOT = Path(__file__).resolve().parents[2]
 GENERATED = ROOT / "generated"
@@ -72,7 +72,7 @@ import kincompile as kc
 for path in sys.argv[1:]:
     names = runpy.run_path(path)
     model = names["mechanism"] if "mechanism" in names else names["system"]
-    for target in ("numpy", "c", "octave", "javascript"):
+    for target in ("numpy", "c", "octave", "javascript", "rust"):
         text = "".join(kc.emit(model, target).files.values())
         print(target, path, hashlib.sha256(text.encode()).hexdigest())
 """

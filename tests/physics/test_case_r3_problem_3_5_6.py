@@ -157,7 +157,7 @@ def test_that_the_lecture_s_end_time_fails_at_the_first_point_past_the_lock_up(p
     assert not solution.success
     np.testing.assert_array_equal(solution.status == kc.Status.CONVERGED, t < 4.5)
     first = np.argmax(t > 4.5)
-    assert solution.status[first] == kc.Status.NOT_CONVERGED
+    assert solution.status[first] == kc.Status.LOCK_UP
     assert f"t = {t[first]:.10g}" in solution.message
 
 

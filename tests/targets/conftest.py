@@ -45,6 +45,7 @@ CONSTANTS = (
 NODE = shutil.which("node") or shutil.which("nodejs")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 OCTAVE = shutil.which("octave-cli")
+RUSTC = shutil.which("rustc")
 
 x, y = sympy.symbols("x y")
 P = sympy.Piecewise
@@ -541,17 +542,75 @@ def in_chromium(folder: Path, variables: dict[str, str], expression: str) -> str
     return result
 
 
+# Prints the quantities of a module at states, which are read from numbers in order.
+SHOWN = """macro_rules! shown {
+    ($m:ident, $name:expr, $line:expr) => {
+        let mut numbers = $line.split(" ").peekable();
+        while numbers.peek().is_some() {
+            let mut take = || numbers.next().unwrap().parse::<f64>().unwrap();
+            let (mut q, mut q_dot) = ([0.0; $m::N_COORDINATES], [0.0; $m::N_COORDINATES]);
+            let mut p = [0.0; $m::N_PARAMETERS];
+            q.iter_mut().for_each(|x| *x = take());
+            q_dot.iter_mut().for_each(|x| *x = take());
+            let t = take();
+            p.iter_mut().for_each(|x| *x = take());
+            println!("{} Phi {:?}", $name, $m::Phi(&q, t, &p));
+            println!("{} Phi_q {:?}", $name, $m::Phi_q(&q, t, &p).concat());
+            println!("{} nu {:?}", $name, $m::nu(&q, t, &p));
+            println!("{} gamma {:?}", $name, $m::gamma(&q, &q_dot, t, &p));
+        }
+    };
+}
+"""
+
+
+def in_rust(cases: dict[str, Case], folder: Path) -> Results:
+    """Evaluate by one program, of which every case is a module."""
+    modules, calls, given = [], [], []
+    for k, (name, case) in enumerate(cases.items()):
+        (folder / f"case_{k}.rs").write_text(kc.emit(case.model, "rust").source, encoding="utf-8")
+        modules.append(f"mod case_{k};")
+        calls.append(f'shown!(case_{k}, "{name}", lines.next().unwrap());')
+        states = (np.concatenate([np.ravel(x) for x in state]) for state in case.points())
+        given.append(" ".join(repr(x) for state in states for x in state.tolist()))
+    read = "let mut text = String::new(); std::io::stdin().read_to_string(&mut text).unwrap();"
+    main = ["use std::io::Read;", "fn main() {", read, "let mut lines = text.lines();", *calls, "}"]
+    found: Results = {}
+    for line in run_rust(folder, "\n".join([*modules, SHOWN, *main]), "\n".join(given)):
+        name, quantity, numbers = line.split(" ", 2)
+        values = [float(x) for x in numbers.strip("[]").split(", ")]
+        shape = (-1, cases[name].q.shape[1]) if quantity == "Phi_q" else (-1,)
+        found.setdefault(name, {}).setdefault(quantity, []).append(np.reshape(values, shape))
+    return {name: {x: np.array(rows) for x, rows in own.items()} for name, own in found.items()}
+
+
+def run_rust(folder: Path, main: str, given: str = "") -> list[str]:
+    """Build a program in a folder, without a warning, and return the lines that it prints."""
+    if RUSTC is None:
+        pytest.skip(NEEDED["rust"][1])
+    (folder / "main.rs").write_text(main, encoding="utf-8")
+    build = (RUSTC, "--edition", "2021", "-D", "warnings", "main.rs")
+    for command in (build, (str(folder / "main"),)):
+        done = subprocess.run(
+            command, cwd=folder, input=given, capture_output=True, text=True, check=False
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout.splitlines()
+
+
 RUNNERS = {
     "interpreter": interpreted,
     "numpy": loaded(form="inline"),
     "grouped": loaded(form="grouped"),
     "c": loaded(target="c"),
     "octave": in_octave,
+    "rust": in_rust,
     "node": in_javascript(in_node),
     "chromium": in_javascript(in_chromium),
 }
 NEEDED = {
     "octave": (OCTAVE, "octave-cli is not installed (Debian: octave)"),
+    "rust": (RUSTC, "rustc is not installed (Debian: rustc)"),
     "node": (NODE, "node is not installed (Debian: nodejs)"),
     "chromium": (CHROMIUM, "Chromium is not installed"),
 }
@@ -559,11 +618,11 @@ NEEDED = {
 
 def marked(names: Any) -> list[Any]:
     """Return targets as parameters of a test; what runs in a browser is slow."""
-    marks = {"chromium": [pytest.mark.slow, pytest.mark.browser]}
+    marks = {"chromium": [pytest.mark.slow, pytest.mark.browser], "rust": [pytest.mark.slow]}
     return [pytest.param(name, marks=marks.get(name, [])) for name in names]
 
 
-MODULES = [name for name in RUNNERS if name not in ("interpreter", "octave")]
+MODULES = [name for name in RUNNERS if name not in ("interpreter", "octave", "rust")]
 """Targets whose file is a module, with constants, and checks of its arguments."""
 
 

@@ -7,17 +7,15 @@ import numpy as np
 import pytest
 
 import kincompile as kc
+from kincompile.emitters.c import target as c
+from kincompile.emitters.javascript import target as javascript
+from kincompile.emitters.numpy import target as numpy
+from kincompile.emitters.octave import target as octave
+from kincompile.emitters.printer import ELEMENTARY, Printer
+from kincompile.emitters.registry import TARGETS, load_target
+from kincompile.emitters.rust import target as rust
+from kincompile.emitters.target import Target
 from kincompile.ir import from_sympy
-from kincompile.targets.c import target as c
-from kincompile.targets.javascript import target as javascript
-from kincompile.targets.numpy import target as numpy
-from kincompile.targets.octave import target as octave
-from kincompile.targets.printer import ELEMENTARY, Printer
-from kincompile.targets.registry import TARGETS, load_target
-from kincompile.targets.target import Target
-
-# One process evaluates each target once for all of them.
-pytestmark = pytest.mark.xdist_group("targets")
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 TOLERANCE = 1e-13
@@ -74,7 +72,9 @@ def test_that_a_vector_of_another_length_is_refused(refused):
 # ---- what all targets say alike ------------------------------------------------------------------
 
 
-MODULES: dict[str, Target] = {"numpy": numpy, "c": c, "octave": octave, "javascript": javascript}
+MODULES: dict[str, Target] = {
+    "numpy": numpy, "c": c, "octave": octave, "javascript": javascript, "rust": rust,
+}  # fmt: skip
 """The modules of the table; mypy compares them with the protocol."""
 
 

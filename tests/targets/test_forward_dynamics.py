@@ -180,6 +180,25 @@ def test_that_octave_has_them_and_integrates(octave, tmp_path):
     np.testing.assert_allclose(own.y[:n, -1], motion.q[-1], atol=1e-8)
 
 
+def test_that_octave_starts_and_moves_alike_in_every_unit_of_length(octave, tmp_path):
+    """From a guess that is not assembled; kc.simulate is the oracle."""
+    units, lines = (1e-6, 1.0, 1e6), []
+    for k, unit in enumerate(units):
+        m = kc.Mechanism(f"pendulum_{k}", end=2.0, points=5)
+        m.gravity = (0, -9.81 * unit)
+        a = m.body("a", guess=(0, -unit, 0), mass=1.0, inertia=0.1 * unit**2)
+        b = m.body("b", (unit / 2, -2 * unit, 0.2), mass=1.0, inertia=0.1 * unit**2)
+        m.add(kc.Revolute("O", m.ground, (0, 0), a, (0, unit)))
+        m.add(kc.Revolute("A", a, (0, -unit), b, (-unit / 2, 0)))
+        kc.emit(m, "octave", dynamics=True).write(tmp_path)
+        lines += [m.name, f"show('{k}', Q([3, 6], :));"]
+    found = octave(lines)
+    known = kc.simulate(kc.compile(m), np.linspace(0, 2, 5), rtol=1e-11)
+    angles = np.column_stack((known["phi_a"], known["phi_b"]))
+    for k in range(len(units)):
+        np.testing.assert_allclose(np.reshape(found[str(k)], (5, 2)), angles, atol=2e-6)
+
+
 def test_that_the_interpreter_has_them():
     from kincompile.ir.accelerations import with_motion
     from kincompile.ir.inline import inline

@@ -5,8 +5,7 @@ import pytest
 from tests.targets.conftest import QUANTITIES
 from tests.targets.golden_rows import assert_golden
 
-# One process evaluates each target once for all of them.
-pytestmark = [pytest.mark.xdist_group("targets"), pytest.mark.slow]
+pytestmark = pytest.mark.slow
 
 
 def test_that_all_targets_give_the_golden_rows(target, case_named) -> None:

@@ -8,6 +8,7 @@ import pytest
 import sympy
 
 import kincompile as kc
+from kincompile import spatial
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.observed import observed
 
@@ -118,6 +119,17 @@ def test_that_lock_ups_are_among_them(example_named):
         for t, p, _ in jobs_of(example.model, example.module):
             kinds |= {event.kind for event in kc.solve(example.module, t, p).events}
     assert kinds == {"lock-up"}
+
+
+def test_that_angles_start_in_the_turn_of_their_driver(solved):
+    m = spatial.Mechanism("wheel")
+    x, z = (1, 0, 0), (0, 0, 1)
+    disc = m.body("disc")
+    m.add(spatial.Screw("S", m.ground, (0, 0, 0), z, x, disc, (0, 0, 0), z, x, 0.3))
+    m.add(spatial.RelativeRotation("motor", m.ground, z, x, disc, z, x, 50 * kc.t))
+    ((found, _),) = solved(m, [[[1.0, 2.0], [], [0, 0, 0, 1, 0, 0, 0, 0]]])
+    angles = np.reshape(found["q"], (2, -1))[:, -1]
+    np.testing.assert_allclose(angles, [50, 100], rtol=1e-13)
 
 
 def parallelogram():

@@ -17,13 +17,13 @@ import sympy
 from sympy import cos, sin, sqrt
 
 import kincompile as kc
+from kincompile.emitters.emission import emit_program
 from kincompile.ir.inline import inline
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.model.laws import TableLaw
 from kincompile.runtime.load import from_source
 from kincompile.runtime.native.module import make_native
-from kincompile.targets.emission import emit_program
 
 NAMES = ("M", "Q", "Q_q", "Q_q_dot")
 STATES = 4
@@ -257,6 +257,7 @@ def test_that_octave_has_them(program, octave, tmp_path):
         assert_equal(np.array(found[name]).reshape(expected()[name].shape), name)
 
 
+@pytest.mark.slow
 def test_that_sympy_shows_them():
     m = loaded()
     symbols = [*m.q, *m.q_dot, kc.t, *sympy.symbols("k g")]

@@ -10,9 +10,6 @@ import kincompile as kc
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 
-# One process evaluates each target once for all of them.
-pytestmark = pytest.mark.xdist_group("targets")
-
 TOLERANCE = 1e-13
 UNSOLVABLE = ("undriven", "driven_twice")
 

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 
 import kincompile as kc
+from kincompile.emitters.printer import ATOM, ELEMENTARY, POWER, Dialect
+from kincompile.emitters.registry import TARGETS, Listed
+from kincompile.emitters.statements import Statements
+from kincompile.emitters.target import Target
 from kincompile.quantities import OF_EQUATIONS, Quantity, singles
-from kincompile.targets.printer import ATOM, ELEMENTARY, POWER, Dialect
-from kincompile.targets.registry import TARGETS, Listed
-from kincompile.targets.statements import Statements
-from kincompile.targets.target import Target
 
 WRITE = Statements("#", "{}", "{}[{}]", "{}[{}][{}]", continued=" \\", ending="")
 

@@ -8,6 +8,7 @@ import pytest
 import sympy
 
 import kincompile as kc
+from kincompile import spatial
 from tests.adversary.chains import reach
 from tests.adversary.test_chains import start_of
 from tests.adversary.test_starts import (
@@ -19,9 +20,7 @@ from tests.adversary.test_starts import (
     solved,
 )
 from tests.targets.conftest import NEEDED, OCTAVE, SPACE
-
-# One process evaluates each target once for all of them.
-pytestmark = pytest.mark.xdist_group("targets")
+from tests.unit.spatial.test_driven_angles import wheel
 
 
 def test_that_the_script_finds_the_same_motion(example, results_of):
@@ -39,7 +38,23 @@ def test_that_the_script_finds_the_same_motion(example, results_of):
 @pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
 @pytest.mark.parametrize("path", SPACE, ids=lambda path: path.stem)
 def test_that_the_script_in_space_finds_the_same_motion(octave, tmp_path, path):
-    model = kc.read_model(path)
+    compare_scripts(octave, tmp_path, kc.read_model(path))
+
+
+@pytest.mark.slow
+def test_that_the_script_counts_the_turns_of_angles(octave, tmp_path):
+    """An angle and a screw beside motors of 8 and 16 turns, and an angle with its own cross."""
+    model = wheel()
+    disc = model.bodies[0]
+    z, y, x = (0, 0, 1), (0, 1, 0), (1, 0, 0)
+    model.add(spatial.JointAngle("aside", model.ground, z, y, disc, z, x, guess=-1.5))
+    solution = compare_scripts(octave, tmp_path, model)
+    np.testing.assert_allclose(solution["theta_turn"], 50 * solution.t)
+    np.testing.assert_allclose(solution["theta_aside"], 50 * solution.t - np.pi / 2)
+
+
+def compare_scripts(octave, tmp_path, model):
+    """Compare the motion of the emitted script with the runtime's, and return that."""
     kc.emit(model, "octave").write(tmp_path)
     shown = {"T": "t", "Q": "q", "Q_dot": "q_dot", "Q_ddot": "q_ddot"}
     found = octave([model.name, *(f"show('{name}', {name});" for name in shown)])
@@ -49,6 +64,7 @@ def test_that_the_script_in_space_finds_the_same_motion(octave, tmp_path, path):
         rows = np.reshape(found[name][0], expected.shape)
         size = np.abs(expected).max()
         np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-9 * size)
+    return solution
 
 
 def test_that_from_a_guess_at_which_phi_q_is_singular_a_position_is_one(octave, tmp_path):
@@ -78,6 +94,36 @@ def test_that_what_cannot_be_assembled_has_no_motion(octave, tmp_path):
     kc.emit(kc.ConstraintSystem("rootless", ["x"], [x**2 + 1 + kc.t**2]), "octave").write(tmp_path)
     refused = "show('refused', strfind(problem.message, 'no position found at t = 0;'));"
     found = octave(["try", "rootless", "show('found', 1);", "catch problem", refused, "end"])
+    assert found == {"refused": [[11.0]]}
+
+
+def test_that_the_script_moves_alike_in_every_unit_of_length(octave, tmp_path):
+    """A point on a circle of radius r, found from a guess beside it: y = r sin((2 + t) / 4)."""
+    x, y = sympy.symbols("x y")
+    lines, units = [], {"tiny": 1e-9, "small": 1e-6, "plain": 1.0, "large": 1e6}
+    for name, r in units.items():
+        equations = [x - r * sympy.cos((2 + kc.t) / 4), x**2 + y**2 - r**2]
+        system = kc.ConstraintSystem(
+            f"circle_{name}", [x, y], equations, guess={"x": r, "y": r / 2}, end=4.0, points=9
+        )
+        kc.emit(system, "octave").write(tmp_path)
+        lines += [system.name, f"show('{name}', [Q(2, :); Q_dot(2, :); Q_ddot(2, :)]);"]
+    found, angle = octave(lines), (2 + np.linspace(0, 4, 9)) / 4
+    known = np.array([np.sin(angle), np.cos(angle) / 4, -np.sin(angle) / 16])
+    for name, r in units.items():
+        values = np.reshape(found[name], (9, 3)).T
+        np.testing.assert_allclose(values, r * known, rtol=0, atol=1e-12 * r)
+
+
+def test_that_the_script_refuses_rates_where_phi_q_is_singular(octave, tmp_path):
+    """It takes the least of all velocities there, 0, where the motion has 1."""
+    x, y = sympy.symbols("x y")
+    equations = [x - kc.t + sympy.Rational(1, 2), y**2 - x**2]
+    guess = {"x": -0.5, "y": -0.5}
+    system = kc.ConstraintSystem("crossing", [x, y], equations, guess=guess, end=1.0, points=5)
+    kc.emit(system, "octave").write(tmp_path)
+    refused = "show('refused', strfind(problem.message, 'Phi_q is singular at t = 0.5'));"
+    found = octave(["try", "crossing", "show('found', 1);", "catch problem", refused, "end"])
     assert found == {"refused": [[11.0]]}
 
 
@@ -168,3 +214,14 @@ def test_that_a_name_beyond_matlab_is_refused():
     m.add(kc.AbsoluteY("y", "b" * 70, (0, 0), 0))
     with pytest.raises(kc.UnsupportedError, match="MATLAB reads 63 characters of a name"):
         kc.emit(m, "octave")
+
+
+@pytest.mark.parametrize("name", ["i", "ans", "e", "zeros"])
+def test_that_a_script_hides_nothing_of_octave(name):
+    m = kc.Mechanism(name)
+    crank = m.body("crank")
+    m.add(kc.Revolute("O", m.ground, (0, 0), crank, (0, 0)))
+    m.add(kc.AbsoluteAngle("motor", crank, kc.t))
+    files = kc.emit(m, target="octave").files
+    assert f"{name}.m" not in files
+    assert f"{name}_Phi.m" in files

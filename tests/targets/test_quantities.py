@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from kincompile import quantities
+from kincompile.emitters.emission import emit_program
 from kincompile.errors import ContractError
 from kincompile.ir.grouping import group
 from kincompile.ir.inline import inline
@@ -19,7 +20,6 @@ from kincompile.quantities import AT_POSITION, Quantity
 from kincompile.runtime.contract import check
 from kincompile.runtime.load import from_source
 from kincompile.runtime.native.module import make_native
-from kincompile.targets.emission import emit_program
 
 TOYS = (
     Quantity("Phi_t", "equations", "none", AT_POSITION, False, "Derivative of Phi by time."),

@@ -9,12 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy
 
 import kincompile as kc
-from kincompile.targets.c import target as c
-from kincompile.targets.javascript import target as javascript
-from kincompile.targets.numpy import target as numpy
-from kincompile.targets.octave import target as octave
+from kincompile.emitters.c import target as c
+from kincompile.emitters.javascript import target as javascript
+from kincompile.emitters.numpy import target as numpy
+from kincompile.emitters.octave import target as octave
+
+from .conftest import run_rust
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ("four_bar", "cam_flat_follower", "cam_by_table", "slider_crank")
@@ -49,8 +52,9 @@ def test_that_functions_that_cs_kernels_call_are_reserved(model):
     lines = re.findall(r"(?m)^ +const double \w+ = ([^;]*);", source)
     called = {name for line in lines for name in re.findall(r"(?<![\w.>])([A-Za-z_]\w*)\(", line)}
     tables = {name for name in called if name.endswith("_contact")}
+    of_march = {*re.findall(r"(?m)^static double (\w+)\((?:const )?strip", source)}
     assert len(lines) > 10
-    assert called - tables <= {*c.RESERVED}
+    assert called - tables - of_march <= {*c.RESERVED}
 
 
 def test_that_functions_that_octaves_files_call_are_reserved(model):
@@ -117,3 +121,109 @@ def test_that_no_script_of_octave_takes_the_place_of_a_function(tmp_path, name):
     assert f"{name}.m" not in files
     assert next(iter(files)) == f"{name}_.m"
     assert f"{name}_Phi.m" in files
+
+
+def words_of_templates() -> list[str]:
+    """Return all words that the text of targets has."""
+    folders = [ROOT / folder / name for name in ("c", "numpy", "javascript", "octave", "rust")
+               for folder in ("templates", "kincompile/emitters")]  # fmt: skip
+    texts = [path.read_text() for folder in folders for path in sorted(folder.iterdir())
+             if path.is_file()]  # fmt: skip
+    words = {word for text in texts for word in re.findall(r"\b[A-Za-z]\w*\b", text)}
+    return sorted(word for word in words if len(word) < 40)
+
+
+def sum_of(names: list[str]) -> kc.ConstraintSystem:
+    """Return x = the sum of k a_k for parameters a_k of these names."""
+    terms = [(k + 1) * sympy.Symbol(name) for k, name in enumerate(names)]
+    x = sympy.Symbol("x_of_it")
+    values = {name: 1.0 + k / 7 for k, name in enumerate(names)}
+    return kc.ConstraintSystem("sum_of_it", [x], [x - sympy.Add(*terms)], parameters=values)
+
+
+@pytest.fixture(scope="module")
+def every_name() -> kc.ConstraintSystem:
+    refused = {"t", "pi", "deg"}
+    names = [word for word in words_of_templates() if word not in refused]
+    while True:
+        try:
+            kc.emit(sum_of(names))
+        except kc.KincompileError as problem:
+            named = [name for name in names if f"'{name}'" in str(problem)]
+            if not named:
+                raise
+            names = [name for name in names if name not in named]
+        else:
+            return sum_of(names)
+
+
+def expected_sum(system: kc.ConstraintSystem) -> float:
+    values = kc.compile(system).DEFAULTS
+    return float(2.5 - np.arange(1, values.size + 1) @ values)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", ["numpy", "c"])
+def test_that_a_parameter_of_any_name_is_a_parameter(every_name, target, quick_compiler):
+    assert len(every_name.parameters) > 500
+    module = kc.compile(every_name, target)
+    assert module.Phi(np.array([[2.5]]), 0.0)[0, 0] == pytest.approx(expected_sum(every_name))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
+def test_that_a_parameter_of_any_name_is_one_in_javascript(every_name, tmp_path):
+    kc.emit(every_name, target="javascript").write(tmp_path)
+    show = "console.log(require('./sum_of_it.js').Phi([2.5], 0)[0])"
+    done = subprocess.run(
+        ["node", "-e", show], cwd=tmp_path, capture_output=True, text=True, check=True, timeout=60
+    )
+    assert float(done.stdout) == pytest.approx(expected_sum(every_name))
+
+
+@pytest.mark.slow
+def test_that_a_parameter_of_any_name_is_one_in_octave(every_name, tmp_path, octave):
+    kc.emit(every_name, target="octave").write(tmp_path)
+    found = octave(["show('Phi', sum_of_it_Phi(2.5, 0));"])
+    assert np.ravel(found["Phi"])[0] == pytest.approx(expected_sum(every_name))
+
+
+@pytest.mark.slow
+def test_that_a_parameter_of_any_name_is_one_in_rust(every_name, tmp_path):
+    kc.emit(every_name, target="rust").write(tmp_path)
+    lines = run_rust(
+        tmp_path,
+        "mod sum_of_it;\nfn main() {\n"
+        'println!("{:?}", sum_of_it::Phi(&[2.5], 0.0, &sum_of_it::DEFAULTS)[0]);\n}',
+    )
+    assert float(lines[0]) == pytest.approx(expected_sum(every_name))
+
+
+def test_that_bodies_and_joints_may_have_any_name_of_c(quick_compiler):
+    m = kc.Mechanism("named")
+    before, offset = m.ground, m.parameter("INLINE", 0.3)
+    for k, name in enumerate(["PI", "LANES", "strip", "F", "look", "NAN", "SIZE_MAX"]):
+        body = m.body(name, guess=(k, 0, 0))
+        m.add(kc.Revolute(f"{name}_pin", before, (1, offset), body, (0, 0)))
+        m.add(kc.RelativeAngle(f"{name}_drive", before, body, kc.t + 1))
+        before = body
+    q = kc.compile(m).GUESS
+    np.testing.assert_allclose(kc.compile(m, "c").Phi(q, 0.2), kc.compile(m).Phi(q, 0.2))
+
+
+def test_that_macros_of_headers_are_reserved(model):
+    compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    if compiler is None:
+        pytest.skip("there is no C compiler")
+    source = kc.emit(model, target="c").source
+    own = "\n".join(re.findall(r"(?m)^#include <.*", source))
+    done = subprocess.run(
+        [compiler, "-std=c99", "-dM", "-E", "-"], input=own, capture_output=True, text=True,
+        check=True, timeout=60,
+    )  # fmt: skip
+    macros = set(re.findall(r"(?m)^#define ([A-Za-z]\w*) ", done.stdout))
+    assert {"NAN", "SIZE_MAX"} <= macros
+    assert macros <= {*c.RESERVED}
+    ours = re.findall(r"(?m)^ *#define (\w+)", source)
+    assert ours
+    assert all(name.startswith("_") for name in ours)

@@ -115,4 +115,4 @@ def test_that_what_lies_beyond_a_lock_up_has_one_status(end, points, quick_compi
     beyond = int(np.argmax(t > LOCKS))
     for status in found:
         assert status[:beyond].tolist() == [kc.Status.CONVERGED] * beyond
-        assert status[beyond] == kc.Status.NOT_CONVERGED
+        assert status[beyond] == kc.Status.LOCK_UP

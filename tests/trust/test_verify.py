@@ -84,7 +84,8 @@ def test_that_an_example_passes(example):
     assert found.passed
     assert found.states == (6, 6)
     outputs = 4 * len(getattr(example.module, "OUTPUTS", ()))
-    assert len(found.table) == 5 * example.module.N_EQUATIONS + 1 + outputs
+    loads = 8 * example.module.N_COORDINATES if hasattr(example.module, "LOADS") else 0
+    assert len(found.table) == 5 * example.module.N_EQUATIONS + 1 + outputs + loads
     assert found.table[0].oracle == "the model"
     assert "all agree" in found.to_text()
     assert max(check.error for check in found.table) < 1e-9

@@ -11,7 +11,7 @@ from kincompile.model.catalogue import CONSTRAINTS
 
 
 @pytest.mark.parametrize(
-    "first", ["kc.Mechanism", "kc.compile", "__import__('kincompile.targets.target')"]
+    "first", ["kc.Mechanism", "kc.compile", "__import__('kincompile.emitters.target')"]
 )
 def test_that_emit_is_the_function_and_not_the_subpackage(first: str) -> None:
     code = f"import kincompile as kc; {first}; print(kc.emit.__module__)"
@@ -65,3 +65,22 @@ def test_that_names_of_the_runtime_do_not_load_sympy(name: str) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert result.stdout.strip() == "False"
+
+
+def test_that_no_folder_hides_a_public_name() -> None:
+    folders = {item.name for item in Path(str(kc.__file__)).parent.iterdir() if item.is_dir()}
+    assert len(folders) > 10
+    assert folders.isdisjoint(dir(kc))
+
+
+def test_that_modules_are_imported_by_their_whole_names() -> None:
+    code = (
+        "import kincompile.checker.matching as a, kincompile.sweeps.plan as b, "
+        "kincompile.derivations.derivation as c, kincompile.verification.verify as d; "
+        "import kincompile as kc; "
+        "print(a.__name__, *map(callable, (kc.compare, kc.sweep, kc.derivation, kc.verify)))"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert result.stdout.split() == ["kincompile.checker.matching", *["True"] * 4]

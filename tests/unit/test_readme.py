@@ -93,7 +93,7 @@ class Reader:
         return printed.getvalue()
 
     def call(self, command: str) -> str:
-        """Return what a command of a console writes; of README each is a process of its own."""
+        """Return what a command of a console writes; a real one is a process of its own."""
         words = shlex.split(command)
         if self.is_real or words[0] != "kincompile" or set(command) & set("|<>;&$*"):
             return self.run(["sh", "-c", command])
@@ -145,9 +145,14 @@ def failure_of(reader: Reader, block: re.Match[str]) -> str:
     return ""
 
 
-@pytest.mark.parametrize(("page", "least"), RUN.items())
-def test_that_a_page_does_what_it_says(page, least, tmp_path):
-    reader = Reader(tmp_path, is_real=page == "README.md")
+REAL = pytest.param("README.md", RUN["README.md"], True, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(
+    ("page", "least", "is_real"), [*((page, least, False) for page, least in RUN.items()), REAL]
+)
+def test_that_a_page_does_what_it_says(page, least, is_real, tmp_path):
+    reader = Reader(tmp_path, is_real)
     blocks = list(BLOCK.finditer((ROOT / page).read_text(encoding="utf-8")))
     assert len(blocks) >= least
     failures = [failure for block in blocks if (failure := failure_of(reader, block))]
@@ -168,7 +173,7 @@ def test_that_the_readme_is_short():
 
 def test_that_the_make_targets_exist():
     targets = re.findall(r"^make (\S+)", README, flags=re.MULTILINE)
-    assert targets == ["demo"]
+    assert targets == ["demo", "test"]
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     assert all(re.search(rf"^{target}:", makefile, flags=re.MULTILINE) for target in targets)
 

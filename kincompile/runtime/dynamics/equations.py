@@ -6,24 +6,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import RESIDUAL_FACTOR, TOLERANCE
+from kincompile.criteria import RANK, RESIDUAL_FACTOR, SMALL_CORRECTION, SOLVED, TOLERANCE
 from kincompile.errors import InputError
 from kincompile.names import without_loads
 from kincompile.runtime.engine.code import DYNAMICS, on_request
+from kincompile.runtime.engine.dense import powers_of_rows
 from kincompile.runtime.problem import problem
+from kincompile.runtime.statics.balance import STEP
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from types import ModuleType
 
     from kincompile.runtime.engine.code import Array, DynamicModules
-    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.inputs import Inputs
 
     Evaluate = Callable[[Array, float], Array]
-
-HELD = 1e-12
-"""Correction of a state, in scales, up to which its constraints hold."""
 
 CORRECTIONS = 8
 """Corrections of a state that drifted, until its constraints hold: each squares what is missing."""
@@ -55,6 +54,9 @@ class Equations:
         rows = [k for k, name in enumerate(self.code.equations) if name not in left_out]
         self.independent = np.array(rows, dtype=int)
         self.evaluations = self.jacobians = 0
+        # By what part of their terms planned accelerations missed their equations where a state was
+        # led back last, and whether they are solved for with pivots.
+        self.missed, self.is_pivoted = 0.0, False
         self._modules = modules
         self._slopes: _Slopes | None = None
         self.measure_at(inputs.guess, float(inputs.t[0]))
@@ -72,8 +74,64 @@ class Equations:
         """Return the rate of a state; NaN where there is none."""
         self.evaluations += 1
         n = self.n
-        found = self._accelerate(y, t)
+        found = self._pivoted(y, t) if self.is_pivoted else self._accelerate(y, t)
         return np.concatenate((y[n : 2 * n], found))
+
+    def turn_to_pivots(self) -> bool:
+        """Choose how accelerations are solved for, at the state that was led back last.
+
+        Return whether the planned solve served so far, and no longer does.
+        """
+        served = not self.is_pivoted
+        self.is_pivoted = bool(self.missed > SOLVED)
+        return served and self.is_pivoted
+
+    def _pivoted(self, y: Array, t: float) -> Array:
+        """Return accelerations and power by a solve with pivots; NaN where there is none.
+
+        Elimination that was planned may miss its equations where masses are of very different size.
+        """
+        n, rows, own, p = self.n, self.independent, self.code.module, self.parameters
+        q, q_dot = y[:n], y[n : 2 * n]
+        point, nothing = self.point(q, t), np.full(n + 1, np.nan)
+        Q = np.asarray(own.Q(q, q_dot, t, p))
+        if point is None or not np.isfinite(Q).all() or self._is_singular(point):
+            return nothing
+        Phi_q, size = point.Phi_q[rows], n + rows.size
+        matrix = np.zeros((size, size))
+        matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = self.inertia(q, t), Phi_q.T, Phi_q
+        sides = np.concatenate((Q, self.code.gamma(q, q_dot, t, p)[rows]))
+        powers = powers_of_rows(matrix)
+        try:
+            found = np.linalg.solve(powers[:, np.newaxis] * matrix, powers * sides)
+            rest = sides - matrix @ found
+            found += np.linalg.solve(powers[:, np.newaxis] * matrix, powers * rest)
+        except np.linalg.LinAlgError:
+            return nothing
+        weights = np.concatenate((self.scale, self.joints.weights()[rows]))
+        terms = weights * (np.abs(matrix) @ np.abs(found) + np.abs(sides))
+        missing = weights * np.abs(matrix @ found - sides)
+        for own_rows in (slice(n), slice(n, None)):  # forces, and equations
+            if not missing[own_rows].max(initial=0.0) <= SOLVED * terms[own_rows].max(initial=0.0):
+                return nothing
+        change = np.imag(own.M(q + 1j * STEP * q_dot, t, p)) / STEP
+        demanded = found[n:] @ self.nu(q, t)[rows]
+        power = Q @ q_dot + q_dot @ change @ q_dot / 2 - demanded
+        return np.append(found[:n], power)
+
+    def _is_singular(self, point: Point) -> bool:
+        """Say whether independent equations depend on each other at a position."""
+        values = np.linalg.svd(self.scaled(point), compute_uv=False)
+        return bool((values <= RANK * values[:1]).any())
+
+    def held_rate(self, t: float, y: Array) -> Array:
+        """Return the rate of a state that is first led back to its constraints; NaN where not.
+
+        Beside a singular configuration the rate of a state that missed them ever so little would be
+        anything.
+        """
+        held, drift = self.corrected(t, y)
+        return self.rate(t, held) if np.isfinite(drift) else np.full_like(y, np.nan)
 
     def jacobian(self, t: float, y: Array) -> Array:
         """Return the derivatives of the rate of a state by the state, shape (2 n + 1, 2 n + 1)."""
@@ -89,14 +147,18 @@ class Equations:
         """
         n, drift = self.n, 0.0
         for _ in range(CORRECTIONS):
-            change = self._correct(y, t)
+            found = self._correct(y, t)
+            change, self.missed = found[: 2 * n], found[-1]
             y = y.copy()
             y[: 2 * n] += change
             sizes = np.abs(change.reshape(2, n)) / self.scale
             drift = max(drift, float(sizes.max(initial=0.0)))
-            if self.joints.is_small(change[:n], y[:n], HELD):
+            if self.joints.is_small(change[:n], y[:n], SMALL_CORRECTION):
                 return y, drift
-        return y, np.nan
+        # Beside a singular configuration rounding errors of Phi move more than that.
+        point = self.joints.at(y[:n], t)
+        holds = point is not None and self.joints.holds_to_rounding(point)
+        return y, drift if holds else np.nan
 
     def point(self, q: Array, t: float) -> Point | None:
         """Return a position with its Phi_q; None where the equations have no finite value."""
@@ -109,12 +171,15 @@ class Equations:
 
     def scaled(self, point: Point) -> Array:
         """Return Phi_q of independent equations, all coordinates and equations to one scale."""
-        matrix = self.joints.weights()[:, np.newaxis] * point.Phi_q * self.scale
-        return np.asarray(matrix[self.independent])
+        return np.asarray(self.joints.scaled(point.Phi_q)[self.independent])
 
     def inertia(self, q: Array, t: float) -> Array:
         """Return M."""
         return np.asarray(self.code.module.M(q, t, self.parameters))
+
+    def demanded(self, q: Array, t: float) -> Array:
+        """Return how fast independent equations demand that movements be, all to one scale."""
+        return np.asarray((self.joints.weights() * self.nu(q, t))[self.independent])
 
     def nu(self, q: Array, t: float) -> Array:
         """Return the right side of the velocity equation."""

@@ -1,12 +1,12 @@
-"""What happens within a step of a simulation: a value that is passed, a singular configuration."""
+"""What happens in a simulation: a value that is passed, a singular configuration."""
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.criteria import IN_RANGE, ROOT_LENGTH, SINGULAR_SENSITIVITY, TINY
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.inputs import mapping_of
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from kincompile.runtime.dynamics.equations import Equations
     from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.inputs import Inputs
 
     States = Callable[[float], Array]
@@ -30,8 +31,8 @@ SENTENCES = {
     STOP: "{name} comes to its stop, {value:.6g}, at t = {t}, and the motion ends there.",
     SINGULAR: (
         "Singular configuration at t = {t}: Phi_q loses rank there, so that no equation of "
-        "motion tells how {bodies} go on. Change a length slightly, begin anew beyond it, or let "
-        "through='smooth' step across it."
+        "motion tells how {bodies} go on. Change a length slightly, begin anew beyond it, or go on "
+        "along the smooth branch with through='smooth'."
     ),
     LOCK_UP: singular.SENTENCES[LOCK_UP],
 }
@@ -41,44 +42,22 @@ NEAR = 1e-3
 """Singular value of the scaled Phi_q, relative to its largest, that explains why a motion ended: it
 falls as the square root of the time that is left."""
 
-SMALL = 1e-7
-"""Singular value of the scaled Phi_q, relative to its largest, that is zero at an event."""
-
-CLOSE = 1e-10
-"""The same of a state that was not looked for."""
-
 PARTS = 8
 """Parts of a step at whose ends a value is looked at: what it passes twice within one is missed."""
 
-LOCATED = 1e-12
-"""How exactly an event is located, relative to the length of the step and to its time."""
-
-
-LARGEST_POWER = 700.0
-"""Power of e beyond which no determinant is given."""
-
 
 class Rank:
-    """Phi_q of a state, scaled, shape (m, n), with its singular values.
+    """Phi_q of a state, scaled, shape (m, n), as far as its singular values are small.
 
-    `free`, shape (n - m, n), are the movements that it leaves free, `movement` is the one that it
-    hinders least of all others.
+    They are at most `part` of the largest; of each, a row of `movements` is what it hardly hinders,
+    and a column of `demands` the equations that say how fast.
     """
 
-    def __init__(self, matrix: Array) -> None:
-        self.matrix = matrix
-        _, self._sizes, right = np.linalg.svd(matrix)
-        self.free, self.movement = right[len(matrix) :], right[len(self._sizes) - 1]
-
-    def is_lost(self, part: float) -> bool:
-        """Say whether its smallest singular value is so small a part of the largest."""
-        return bool(self._sizes[-1] <= part * self._sizes[0])
-
-
-def signed(matrix: Array, rows: Array) -> float:
-    """Return the determinant of a matrix with further rows, bounded."""
-    sign, size = np.linalg.slogdet(np.concatenate((matrix, rows)))
-    return float(sign * math.exp(min(size, LARGEST_POWER)))
+    def __init__(self, matrix: Array, part: float) -> None:
+        left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
+        lost = sizes <= part * sizes[:1]
+        self.is_lost = bool(lost.any())
+        self.movements, self.demands = right[lost], left[:, lost]
 
 
 def _asked(kind: str, values: Mapping[str, Any]) -> Iterator[tuple[str, str, float]]:
@@ -91,7 +70,7 @@ def _asked(kind: str, values: Mapping[str, Any]) -> Iterator[tuple[str, str, flo
 
 
 class Watch:
-    """Looks for events in each step: values of coordinates or outputs, and singular configurations.
+    """Looks for values of coordinates or outputs in each step, and names singular configurations.
 
     At `stops` the motion ends; with `smooth` it goes on through singular configurations.
     """
@@ -114,7 +93,6 @@ class Watch:
         self._names = self._checked([name for _, name, _ in given])
         self._values = np.array([value for _, _, value in given])
         self._signs = np.zeros(len(given))
-        self._rank: Rank | None = None
 
     def _checked(self, names: list[str]) -> list[str]:
         known = (*self._inputs.code.coordinates, *self._outputs)
@@ -131,11 +109,10 @@ class Watch:
         """Look at the first state."""
         if self._names:
             self._signs = np.sign(self._away(t, y))
-        self._rank = self._rank_at(t, y)
 
-    def events(self, t0: float, t1: float, state: States) -> list[Event]:
+    def events(self, t0: float, t1: float, state: States, singular: Event | None) -> list[Event]:
         """Return what happens in a step, in order, and remember its end."""
-        found: list[Event] = []
+        found: list[Event] = [] if singular is None else [singular]
         if self._names:
             for part in range(1, PARTS + 1):
                 first, last = (t0 + (t1 - t0) * x / PARTS for x in (part - 1, part))
@@ -144,28 +121,35 @@ class Watch:
                 for k in np.flatnonzero((self._signs != 0) & (now != self._signs)).tolist():
                     found.append(self._located(k, first, last, state))
                 self._signs = now
-        singular = self._singular(t0, t1, state)
-        if singular is not None:
-            found.append(singular)
         return sorted(found, key=lambda event: event.t, reverse=t1 < t0)
 
     def ends(self, event: Event) -> bool:
         """Say whether an event ends the motion."""
         return event.kind == STOP or (event.kind == SINGULAR and not self._smooth)
 
-    def singular_at(self, t: float, y: Array) -> Event | None:
-        """Return the event of a state at which Phi_q is singular, None where it is not."""
-        found = self._rank_at(t, y)
-        if found is None or not found.is_lost(SMALL):
+    def singular_at(self, t: float, q: Array) -> Event | None:
+        """Return the event of a position at which Phi_q is singular, None where it is not."""
+        point = self._equations.point(q, t)
+        if point is None or not self._equations.holds(point):
             return None
-        return self._event_at(SINGULAR, t, y, found.movement)
+        found = self._rank_at(point, 1 / SINGULAR_SENSITIVITY)
+        return self._event_at(SINGULAR, t, q, found) if found.is_lost else None
 
-    def lock_up_at(self, t: float, y: Array) -> Event | None:
-        """Return the event of a state at which the motion ended near a singular configuration."""
-        found = self._rank_at(t, y)
-        if found is None or not found.is_lost(NEAR):
+    def end_at(self, t: float, q: Array) -> Event | None:
+        """Return the event of a position at which the motion ended near a singular configuration.
+
+        A lock-up is one only where equations that are lost demand a velocity.
+        """
+        point = self._equations.point(q, t)
+        if point is None:
             return None
-        return self._event_at(LOCK_UP, t, y, found.movement)
+        found = self._rank_at(point, NEAR)
+        if not found.is_lost:
+            return None
+        demanded = self._equations.demanded(q, t)
+        size = float(np.linalg.norm(found.demands.T @ demanded))
+        is_driven = size > IN_RANGE * float(np.linalg.norm(demanded))
+        return self._event_at(LOCK_UP if is_driven else SINGULAR, t, q, found)
 
     def _away(self, t: float, y: Array) -> Array:
         """Return how far the columns are above the values that are looked for."""
@@ -185,43 +169,16 @@ class Watch:
         owner = self._inputs.code.owners().get(name)
         return Event(self._kinds[k], t, () if owner is None else (owner,), text, q, {})
 
-    def _singular(self, t0: float, t1: float, state: States) -> Event | None:
-        """Return the singular configuration within a step, if there is one.
+    def _rank_at(self, point: Point, part: float) -> Rank:
+        return Rank(self._equations.scaled(point), part)
 
-        With the free movements of its beginning as further rows, Phi_q is a square matrix, whose
-        determinant changes its sign where Phi_q loses rank.
-        """
-        before, y = self._rank, state(t1)
-        now = self._rank = self._rank_at(t1, y)
-        if before is None or now is None:
-            return None
-        if now.is_lost(CLOSE):
-            return self._event_at(SINGULAR, t1, y, now.movement)
-
-        def determinant(t: float) -> float:
-            found = self._matrix(t, state(t))
-            return math.nan if found is None else signed(found, before.free)
-
-        if not signed(before.matrix, before.free) * signed(now.matrix, before.free) < 0:
-            return None
-        return self.singular_at(t := root(determinant, t0, t1), state(t))
-
-    def _matrix(self, t: float, y: Array) -> Array | None:
-        """Return Phi_q, scaled; None where it has no finite value."""
-        point = self._equations.point(y[: self._equations.n], t)
-        return None if point is None else self._equations.scaled(point)
-
-    def _rank_at(self, t: float, y: Array) -> Rank | None:
-        matrix = self._matrix(t, y)
-        return None if matrix is None or not len(matrix) else Rank(matrix)
-
-    def _event_at(self, kind: str, t: float, y: Array, movement: Array) -> Event:
-        code, n = self._inputs.code, self._equations.n
+    def _event_at(self, kind: str, t: float, q: Array, found: Rank) -> Event:
+        code, movement = self._inputs.code, found.movements[-1]
         share = movement / np.abs(movement).max()
-        bodies = involved(code, share)
+        bodies = involved(code, np.linalg.norm(found.movements, axis=0))
         text = SENTENCES[kind].format(t=f"{t:.10g}", bodies=listed(bodies))
         shares = dict(zip(code.coordinates, share.tolist(), strict=True))
-        return Event(kind, t, bodies, text, y[:n].copy(), shares)
+        return Event(kind, t, bodies, text, q.copy(), shares)
 
 
 def root(function: Callable[[float], float], t0: float, t1: float) -> float:
@@ -229,5 +186,5 @@ def root(function: Callable[[float], float], t0: float, t1: float) -> float:
     from scipy.optimize import brentq
 
     low, high = min(t0, t1), max(t0, t1)
-    width = LOCATED * max(high - low, abs(low), abs(high))
-    return float(brentq(function, low, high, xtol=max(width, 1e-300), rtol=4 * np.finfo(float).eps))
+    width = ROOT_LENGTH * max(high - low, abs(low), abs(high))
+    return float(brentq(function, low, high, xtol=max(width, TINY), rtol=4 * np.finfo(float).eps))

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import SAME_TIME
 from kincompile.runtime.dynamics.happenings import SINGULAR, STOP
+from kincompile.runtime.dynamics.poses import MIDDLE, ahead, foreseen, passage, times_to
 from kincompile.runtime.dynamics.solvers import MOST_STEPS, stepper
 from kincompile.runtime.status import Status
 
@@ -16,11 +18,15 @@ if TYPE_CHECKING:
 
     from kincompile.runtime.dynamics.equations import Equations
     from kincompile.runtime.dynamics.happenings import Watch
+    from kincompile.runtime.dynamics.poses import Passage
     from kincompile.runtime.dynamics.solvers import Stepper
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.follow import Progress
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.singular.events import Event
+
+    States = Callable[[float], Array]
+    Between = Callable[[], States]
 
 WORDS = {
     "done": "{name}: {points} points by {steps} steps of {method}. The energy is off by at most "
@@ -43,6 +49,52 @@ COLUMNS = (
     "q", "q_dot", "q_ddot", "kinetic", "work", "drift", "residual", "status", "steps"
 )  # fmt: skip
 """Arrays with an entry for each point."""
+
+
+NEAR_PART = 0.5
+"""Part of the time to a singular configuration up to which an ordinary step may be long."""
+
+NEAR, NEARER = 0.1, 0.7
+"""Movement, in scales, to a singular configuration from which a step across it is tried, and part
+of its time after which that is tried again."""
+
+LEFT = 1e-5
+"""Movement to a singular configuration that no step led across: the motion ends there."""
+
+
+class Step:
+    """A step from one time to another, and the states within it, led back to their constraints.
+
+    Across a singular configuration it has a passage and its event.
+    """
+
+    passage: Passage | None = None
+    event: Event | None = None
+
+    def __init__(
+        self, equations: Equations, begin: float, end: float, last: Array, between: Between
+    ) -> None:
+        self._equations, self._between = equations, between
+        self.begin, self.end, self.last = begin, end, last
+        self._known: States | None = None
+
+    def at(self, t: float) -> Array:
+        """Return the state at a time."""
+        if t == self.end:
+            return self.last
+        self._known = self._known or self._between()
+        y = self._known(t)
+        if self.passage is None or not self.passage.covers(t):
+            return self._equations.corrected(t, y)[0]
+        q, q_dot, _ = self.passage.at(t)
+        return np.concatenate((q, q_dot, y[-1:]))
+
+    def rate(self, t: float, y: Array) -> Array:
+        """Return the rate of its state at a time."""
+        if self.passage is None or not self.passage.covers(t):
+            return self._equations.rate(t, y)
+        _, q_dot, q_ddot = self.passage.at(t)
+        return np.concatenate((q_dot, q_ddot, [0.0]))
 
 
 class Integration:
@@ -88,81 +140,138 @@ class Integration:
     def run(self, y: Array, method: str, rtol: float, atol: float | None, max_step: float) -> None:
         """Follow the motion from its first state."""
         equations, t0 = self._equations, float(self.t[0])
+        equations.corrected(t0, y)
+        equations.turn_to_pivots()
         if not np.isfinite(equations.rate(t0, y)).all():
-            event = self._watch.singular_at(t0, y)
+            event = self._watch.singular_at(t0, y[: equations.n])
             self._fail(t0, event, WORDS["nothing"], Status.NOT_FINITE)
             return
         allowed = (rtol if atol is None else atol) * equations.scale
         # The work follows from the motion: it does not decide how long steps are.
-        tolerance = rtol, np.concatenate((allowed, allowed, [np.inf]))
+        self._tolerance = rtol, np.concatenate((allowed, allowed, [np.inf]))
+        self._method, self._longest = method, max_step
         self._watch.begin(t0, y)
-        self._put(t0, y)
-        self._method = method
-        rates = equations.rate, equations.jacobian
-        solver = stepper(method, rates, self.t[[0, -1]], y, tolerance, max_step)
-        while self._index < self.t.size and self._step(solver):
-            pass
+        self._put(t0, y, equations.rate(t0, y))
+        solver = self._begun(t0, y, None)
+        while self._index < self.t.size:
+            following = self._step(solver)
+            if following is None:
+                break
+            solver = following
         if self.message == "":
             self._say_done()
 
-    def _step(self, solver: Stepper) -> bool:
-        """Take a step with all points within it; say whether the motion goes on."""
-        before, y = solver.t, solver.y
-        solver.step()
+    def _begun(self, t: float, y: Array, first: float | None) -> Stepper:
+        """Return the integrator at a state, which satisfies its constraints."""
+        self._held, self._times, self._tried = y, times_to(self._equations, t, y), math.inf
+        rates, end = (self._equations.rate, self._equations.jacobian), float(self.t[-1])
+        first = first and min(first, abs(end - t))
+        return stepper(self._method, rates, (t, end), y, self._tolerance, self._longest, first)
+
+    def _step(self, solver: Stepper) -> Stepper | None:
+        """Take a step with all points within it; return what goes on, None where nothing does."""
+        before, y, length = solver.t, self._held, solver.length
+        coming = ahead(self._times, self._forward)
+        step = self._across(before, y, coming) if self._is_near(y, coming, length) else None
+        if step is None and self._movement(y, coming) <= LEFT:
+            self._stop(before, y, WORDS["drift"])
+            return None
+        if step is None:
+            solver.step(NEAR_PART * coming)
+            if solver.problem or not np.isfinite(solver.y).all():
+                text = WORDS["step"].format(problem=solver.problem or "the rates are not finite")
+                self._stop(before, y, text)
+                return None
+            held, drift = self._equations.corrected(solver.t, solver.y)
+            if self._equations.turn_to_pivots():
+                return self._begun(before, y, length)
+            step = Step(self._equations, before, solver.t, held, solver.between)
+            times = times_to(self._equations, step.end, held) if math.isfinite(drift) else None
+            if times is None or ahead(times, -self._forward) < abs(step.end - before):
+                return self._shorter(step, y)
+            self._moved = max(self._moved, drift)
+            solver.put(held)
+            self._held, self._times = held, times
         self._taken += 1
         self._total += 1
-        if solver.problem or not np.isfinite(solver.y).all():
-            text = WORDS["step"].format(problem=solver.problem or "the rates are not finite")
-            self._fail(before, self._watch.lock_up_at(before, y), text, Status.NOT_CONVERGED)
-            return False
-        held, drift = self._equations.corrected(solver.t, solver.y)
-        if not math.isfinite(drift):
-            event = self._watch.lock_up_at(before, y)
-            self._fail(before, event, WORDS["drift"], Status.NOT_CONVERGED)
-            return False
-        self._moved = max(self._moved, drift)
-        solver.put(held)
-        state = self._states(solver, held)
-        happened = self._watch.events(before, solver.t, state)
-        for event in happened:
+        for event in self._watch.events(before, step.end, step.at, step.event):
             self.events.append(event)
             if self._watch.ends(event):
-                self._fill(event.t, state)
-                self._end(event, state)
-                return False
-        self._fill(solver.t, state)
+                self._fill(event.t, step)
+                self._end(event, step)
+                return None
+        self._fill(step.end, step)
         if self._taken > MOST_STEPS:
-            self._fail(solver.t, None, WORDS["many"].format(most=MOST_STEPS), Status.NOT_CONVERGED)
+            text = WORDS["many"].format(most=MOST_STEPS)
+            self._fail(step.end, None, text, Status.NOT_CONVERGED)
+            return None
+        if step.passage is None or self._index == self.t.size:
+            return solver
+        return self._begun(step.end, step.last, length)
+
+    def _is_near(self, y: Array, coming: float, length: float) -> bool:
+        """Say whether a step across the singular configuration that comes is to be tried."""
+        if coming > self._tried:
+            self._tried = math.inf
+        is_near = self._movement(y, coming) <= NEAR or length > NEAR_PART * coming
+        if not (is_near and coming <= NEARER * self._tried):
             return False
+        self._tried = coming
         return True
 
-    def _states(self, solver: Stepper, end: Array) -> Callable[[float], Array]:
-        """Return the states within a step, led back to their constraints."""
-        known: list[Callable[[float], Array]] = []
-        last = solver.t
+    def _movement(self, y: Array, time: float) -> float:
+        """Return how far a state moves in a time at most, in scales."""
+        n, scale = self._equations.n, self._equations.scale
+        return time * float((np.abs(y[n : 2 * n]) / scale).max(initial=0.0))
 
-        def state(t: float) -> Array:
-            if t == last:
-                return end
-            if not known:
-                known.append(solver.between())
-            return self._equations.corrected(t, known[0](t))[0]
+    def _shorter(self, step: Step, y: Array) -> Stepper | None:
+        """Take half of a step that cannot be led back, or has a singular configuration in it."""
+        half = abs(step.end - step.begin) / 2
+        if half > SAME_TIME * max(abs(step.begin), abs(step.end)):
+            return self._begun(step.begin, y, half)
+        self._stop(step.begin, y, WORDS["drift"])
+        return None
 
-        return state
+    def _across(self, t: float, y: Array, coming: float) -> Step | None:
+        """Return a step across the singular configuration that comes; None where none succeeds."""
+        equations = self._equations
+        length = foreseen(equations, t, y, self._forward * coming) / MIDDLE
+        if not abs(length) <= self._longest:
+            return None
+        rates, span = (equations.held_rate, equations.jacobian), (t, t + length)
+        solver = stepper("DOP853", rates, span, y, self._tolerance, math.inf, abs(span[1] - t))
+        solver.step(math.inf)
+        if solver.problem or solver.t != span[1]:
+            return None
+        held, drift = equations.corrected(solver.t, solver.y)
+        if not math.isfinite(drift):
+            return None
+        step = Step(equations, t, solver.t, held, solver.between)
+        step.passage = passage(equations, t, solver.t, step.at)
+        if step.passage is None:
+            return None
+        step.event = self._watch.singular_at(step.passage.t, step.at(step.passage.t)[: equations.n])
+        if step.event is None:
+            return None
+        self._moved = max(self._moved, drift)
+        return step
 
-    def _fill(self, end: float, state: Callable[[float], Array]) -> None:
+    @property
+    def _forward(self) -> float:
+        return math.copysign(1.0, self.t[-1] - self.t[0])
+
+    def _fill(self, end: float, step: Step) -> None:
         """Put down the points up to a time."""
-        forward = math.copysign(1.0, self.t[-1] - self.t[0])
-        while self._index < self.t.size and (self.t[self._index] - end) * forward <= 0:
+        while self._index < self.t.size and (self.t[self._index] - end) * self._forward <= 0:
             t = float(self.t[self._index])
-            self._put(t, state(t))
+            y = step.at(t)
+            self._put(t, y, step.rate(t, y))
 
-    def _put(self, t: float, y: Array) -> None:
+    def _put(self, t: float, y: Array, rate: Array) -> None:
         """Put down a point."""
         k, n, equations = self._index, self._equations.n, self._equations
         q, q_dot = y[:n], y[n : 2 * n]
         point = equations.point(q, t)
-        rate = equations.rate(t, y)
         self.q[k], self.q_dot[k], self.q_ddot[k] = q, q_dot, rate[n : 2 * n]
         self.kinetic[k] = q_dot @ equations.inertia(q, t) @ q_dot / 2
         self.work[k], self.drift[k] = y[-1], self._moved
@@ -183,7 +292,12 @@ class Integration:
         self.status[self._index] = status
         self.message = WORDS["stopped"].format(name=self._name, t=t, why=why)
 
-    def _end(self, event: Event, state: Callable[[float], Array]) -> None:
+    def _stop(self, t: float, y: Array, why: str) -> None:
+        """Note why the motion ends at a state, near a singular configuration or elsewhere."""
+        event = self._watch.end_at(t, y[: self._equations.n])
+        self._fail(t, event, why, Status.NOT_CONVERGED)
+
+    def _end(self, event: Event, step: Step) -> None:
         """End the motion at an event."""
         if event.kind == SINGULAR:
             self._fail(event.t, None, event.message, Status.SINGULAR)
@@ -196,7 +310,8 @@ class Integration:
         self.t = np.append(self.t[:k], event.t)
         for name in COLUMNS:
             setattr(self, name, getattr(self, name)[: k + 1])
-        self._put(event.t, state(event.t))
+        y = step.at(event.t)
+        self._put(event.t, y, step.rate(event.t, y))
 
     def _say_done(self) -> None:
         """Say how it went."""

@@ -3,6 +3,7 @@
 inputs     checked; the equations of motion are compiled on request   equations.Equations
   -> a state that the constraints allow                               start.position_at, velocity_at
   -> step by step, led back to the constraints after each             integrate.Integration
+       a singular configuration is foreseen, and stepped across       poses
        what happens within a step is located                          happenings.Watch
   -> a Solution, with energies and drift as columns                   simulate
 """
@@ -99,8 +100,8 @@ def simulate(
     max_step : float
         The longest step [s].
     through : {"smooth"}, optional
-        Go on through a singular configuration, as the integrator happens to step across it; without
-        it the motion ends there.
+        Go on through singular configurations along the smooth branch; without it the motion ends
+        at the first.
     throw : bool
         Raise `SolveError` unless every point was found.
     progress : callable, optional
@@ -135,7 +136,7 @@ def simulate(
     held = given_values(names, position, 0, "position")
     rates = {}
     if isinstance(velocity, Mapping):
-        known = (*names, *moving(module)[1]) if inputs.code.covers() else names
+        known = (*names, *moving(module)[1]) if inputs.code.covers.size else names
         rates = given_values(known, velocity, 1, "velocity")
         velocity = None
     elif velocity is not None and np.shape(velocity) != (len(names),):

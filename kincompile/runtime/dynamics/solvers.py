@@ -7,6 +7,7 @@ states are led back where they are given out. Implicit methods get the derivativ
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -43,8 +44,12 @@ class Stepper(Protocol):
     def y(self) -> Array:
         """State after the last step."""
 
-    def step(self) -> None:
-        """Take a step, not beyond the last time."""
+    @property
+    def length(self) -> float:
+        """How long the next step is meant to be."""
+
+    def step(self, longest: float) -> None:
+        """Take a step, no longer than this and not beyond the last time."""
 
     def put(self, y: Array) -> None:
         """Go on from another state, where that is possible."""
@@ -56,40 +61,42 @@ class Stepper(Protocol):
 def stepper(
     method: str,
     rates: tuple[Rate, Rate],
-    t: Array,
+    t: tuple[float, float],
     y: Array,
     tolerance: tuple[float, Array],
     max_step: float,
+    first: float | None = None,
 ) -> Stepper:
     """Return an integrator, one of `METHODS`, at its first state.
 
     The rates are that of a state at a time, and the derivatives of it by the state; `t` are the
-    first and last time; the tolerance is relative, and absolute for each number.
+    first and last time; the tolerance is relative, and absolute for each number; `first` is the
+    length of the first step, where it is known.
     """
     if method not in METHODS:
         raise InputError(f"method is {method!r}: give one of {', '.join(METHODS)}.")
     make: type[_OneStep | _Multistep] = _Multistep if method == "CVODE" else _OneStep
-    return make(method, rates, t, y, tolerance, max_step)
+    return make(method, rates, t, y, tolerance, max_step, first)
 
 
 class _OneStep:
     """A solver of SciPy."""
 
     def __init__(
-        self, method: str, rates: tuple[Rate, Rate], t: Array, y: Array,
-        tolerance: tuple[float, Array], max_step: float,
+        self, method: str, rates: tuple[Rate, Rate], t: tuple[float, float], y: Array,
+        tolerance: tuple[float, Array], max_step: float, first: float | None,
     ) -> None:  # fmt: skip
         from scipy import integrate
 
         rtol, atol = tolerance
         self.problem = ""
         self._rate, jacobian = rates
-        self._has_history = method in HISTORY
+        self._has_history, self._longest = method in HISTORY, max_step
         given = {} if method == "DOP853" else {"jac": jacobian}
         solver = getattr(integrate, method)
         self._solver: Any = solver(
-            self._rate, float(t[0]), y, float(t[-1]), rtol=rtol, atol=atol, max_step=max_step,
-            **given,
+            self._rate, t[0], y, t[1], rtol=rtol, atol=atol, max_step=max_step,
+            first_step=first, **given,
         )  # fmt: skip
 
     @property
@@ -100,7 +107,12 @@ class _OneStep:
     def y(self) -> Array:
         return np.asarray(self._solver.y)
 
-    def step(self) -> None:
+    @property
+    def length(self) -> float:
+        return float(min(self._solver.h_abs, self._longest))
+
+    def step(self, longest: float) -> None:
+        self._solver.max_step = min(self._longest, longest)
         try:
             self._solver.step()
         except ValueError:  # numbers that are not finite, in the linear algebra of Radau
@@ -125,8 +137,8 @@ class _Multistep:
     """CVODE of SUNDIALS, from scikit-sundae."""
 
     def __init__(
-        self, method: str, rates: tuple[Rate, Rate], t: Array, y: Array,
-        tolerance: tuple[float, Array], max_step: float,
+        self, method: str, rates: tuple[Rate, Rate], t: tuple[float, float], y: Array,
+        tolerance: tuple[float, Array], max_step: float, first: float | None,
     ) -> None:  # fmt: skip
         del method
         rate, jacobian = rates
@@ -141,21 +153,26 @@ class _Multistep:
             found[:] = jacobian(t, y)
             return int(not np.isfinite(found).all())
 
-        rtol, atol = tolerance
+        rtol, atol = (part * STRICTER / np.sqrt(y.size) for part in tolerance)
         longest = max_step if np.isfinite(max_step) else 0.0
         finite = np.where(np.isfinite(atol), atol, LARGE)
-        self.problem, self.t, self.y, self._end = "", float(t[0]), y, float(t[-1])
+        self.problem, self.t, self.y, self._end = "", t[0], y, t[1]
+        self.length = first or 0.0
         self._solver = CVODE(
-            into, rtol=rtol, atol=finite, max_step=longest, max_num_steps=MOST_STEPS,
-            jacfn=slopes_into,
+            into, rtol=float(rtol), atol=finite,
+            first_step=math.copysign(self.length, t[1] - t[0]), max_step=longest,
+            max_num_steps=MOST_STEPS, jacfn=slopes_into,
         )  # fmt: skip
         self._solver.init_step(self.t, y)
 
-    def step(self) -> None:
-        found = self._solver.step(self._end, "onestep", tstop=self._end)
+    def step(self, longest: float) -> None:
+        left = self._end - self.t
+        stop = self._end if longest >= abs(left) else self.t + math.copysign(longest, left)
+        found = self._solver.step(self._end, "onestep", tstop=stop)
         if not found.success:
             self.problem = f"CVODE says: {found.message}"
             return
+        self.length = abs(float(found.t) - self.t)
         self.t, self.y = float(found.t), np.asarray(found.y)
 
     def put(self, y: Array) -> None:
@@ -171,3 +188,8 @@ MOST_STEPS = 100_000
 
 LARGE = 1e100
 """An absolute tolerance that never counts."""
+
+STRICTER = 0.1
+"""Part of the tolerance that CVODE gets: Newton's method ends there at a tenth of it, with a matrix
+up to 50 steps old, in SciPy's BDF at its root. And since it judges the mean of all numbers, with
+those that never count, one of them may be wrong by the root of their number."""

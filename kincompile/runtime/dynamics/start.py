@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import MAX_ITERATIONS, RANK, TOLERANCE
+from kincompile.criteria import HALF, RANK
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, rate, suggestion
+from kincompile.runtime.corrector import nearest
 from kincompile.runtime.engine.code import JOINT_POINTS
 from kincompile.runtime.inputs import mapping_of
 from kincompile.runtime.singular.reach import missed
+from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,14 +25,8 @@ if TYPE_CHECKING:
 
     from kincompile.runtime.dynamics.equations import Equations
     from kincompile.runtime.engine.code import Array
-    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.inputs import Values
-
-AGREE = 1e-8
-"""Part of the velocities up to which those given agree with the constraints."""
-
-LARGEST_TURN = 1.0
-"""Largest change of a coordinate in one correction, in scales."""
 
 
 def given_values(
@@ -65,28 +61,14 @@ def position_at(equations: Equations, guess: Array, t: float, given: Mapping[str
 
     A `NotAssembledError` says what is missed where there is none.
     """
-    q, names = guess.copy(), equations.code.coordinates
-    held = {names.index(name): value for name, value in given.items()}
-    q[list(held)] = list(held.values())
-    open_ = np.array([column for column in range(q.size) if column not in held], dtype=int)
-    scale, weights = equations.scale, equations.joints.weights()
-    point = None
-    for _ in range(MAX_ITERATIONS):
-        point = equations.point(q, t)
-        if point is None:
-            break
-        matrix = (weights[:, np.newaxis] * point.Phi_q * scale)[:, open_]
-        change = -np.linalg.lstsq(matrix, weights * point.Phi, rcond=RANK)[0]
-        size = float(np.abs(change).max(initial=0.0))
-        moved = np.zeros_like(q)
-        moved[open_] = scale[open_] * change * min(1.0, LARGEST_TURN / max(size, 1e-300))
-        q = q + moved
-        if equations.joints.is_small(moved, q, TOLERANCE):
-            found = equations.point(q, t)
-            if found is not None and equations.holds(found):
-                return found
-            break
-    raise NotAssembledError(_unmet(equations, point, list(given)))
+    names, q = equations.code.coordinates, guess.copy()
+    held = [names.index(name) for name in given]
+    q[held] = list(given.values())
+    attempt = nearest(equations.joints, t, q, held)
+    if attempt.status is not Status.CONVERGED:
+        point = None if attempt.status is Status.NOT_FINITE else attempt.last
+        raise NotAssembledError(_unmet(equations, point, list(given)))
+    return attempt.last
 
 
 def _unmet(equations: Equations, point: Point | None, fixed: Sequence[str]) -> str:
@@ -129,7 +111,7 @@ def velocity_at(
         found = found - free @ np.linalg.lstsq(reduced, free.T @ inertia @ found, rcond=None)[0]
     rest = np.abs(matrix @ found - sides)
     level = np.abs(matrix) @ np.abs(found) + np.abs(sides)
-    if (rest > AGREE * level.max(initial=0.0)).any():
+    if (rest > HALF * level.max(initial=0.0)).any():
         raise NotAssembledError(
             f"the velocities of {listed(given)} cannot all be as given: constraints connect them. "
             f"Give those of as many coordinates as there are degrees of freedom, such as "

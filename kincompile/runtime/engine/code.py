@@ -13,7 +13,7 @@ from kincompile.errors import InputError, StructuralError, UnsupportedError
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from types import ModuleType
 
 Array = NDArray[np.float64]
@@ -35,6 +35,9 @@ FORCES = "_forces"
 
 DYNAMICS = "_dynamics"
 """Where a module of a mechanism with loads keeps what compiles its equations of motion."""
+
+UNDRIVEN = "_undriven"
+"""Where a module keeps the function that says which drivers are missing, "" if none are."""
 
 DRIVERS = "_drivers"
 """Where a module keeps the function that describes its drivers at a time and parameters."""
@@ -61,9 +64,9 @@ class SensitiveModules:
     """What compiles a mechanism's sensitivities to parameters on request, and keeps them."""
 
     # Takes names of parameters and of columns, and whether second derivatives are wanted, to a
-    # module without equations whose outputs are the determinants of the blocks of Phi_q, then by
-    # parameter, and by pair of them, the derivatives of the columns; None where there is no planned
-    # elimination.
+    # module without equations whose outputs are by what part of their terms solves miss their
+    # equations, the determinants of the blocks of Phi_q, then by parameter, and by pair of them,
+    # the derivatives of the columns; None where there is no planned elimination.
     observing: Callable[[tuple[str, ...], tuple[str, ...], bool], ModuleType | None]
     # Takes names of parameters to the module of the mechanism with its sensitivities.
     larger: Callable[[tuple[str, ...]], ModuleType]
@@ -74,9 +77,9 @@ class ForceModules:
     """What compiles the forces of a mechanism on request, and keeps them."""
 
     # Takes whether multipliers are to be solved for to a module without equations whose outputs are
-    # the determinants of the blocks of Phi_q and the multipliers, then the forces, without rates;
-    # None where there is no planned elimination. Else it gives the forces alone, and multipliers
-    # are its last parameters.
+    # by what part of its terms the solve misses its equations, the determinants of the blocks of
+    # Phi_q and the multipliers, then the forces, without rates; None where there is no planned
+    # elimination. Else it gives the forces alone, and multipliers are its last parameters.
     compiled: Callable[[bool], ModuleType | None]
     # The bodies of each constraint, by name; none of a free equation.
     joints: Mapping[str, tuple[str, ...]]
@@ -94,7 +97,7 @@ class DynamicModules:
     # drivers.
     accelerations: ModuleType
     # The same, of changes of the coordinates and then of the rates that lead a state back to its
-    # constraints.
+    # constraints, and by what part of their terms the accelerations there miss their equations.
     corrections: ModuleType
     # Compiles on request, and keeps, a module whose outputs are entries of the linear system of the
     # derivatives of accelerations and power by q and q_dot, with their rows and columns, and the
@@ -119,10 +122,18 @@ class Code:
     pattern: NDArray[np.signedinteger[Any]]  # (nnz, 2): rows and columns of Phi_q's entries
     # Of each body its name, the number of its first coordinate, and how many it has.
     bodies: tuple[tuple[str, int, int], ...]
+    # Row, column and, where it never changes, the number of each entry of Phi_q.
+    entries: tuple[tuple[int, int, float | None], ...]
+    # (m, n): those that never change, in a matrix
+    constant: Array
+    # By column, the others: the row of each, and its number among all that vary.
+    varying: tuple[tuple[int, tuple[tuple[int, int], ...]], ...]
     # Bodies whose guess is zero throughout, as it is where none is given.
     without_guess: tuple[str, ...]
     # (n,), bool: which coordinates have the scale of angles: these, and Euler parameters
     angular: NDArray[np.bool_]
+    # (bodies, 4): places of the Euler parameters of bodies in space: p and -p are one orientation
+    covers: NDArray[np.signedinteger[Any]]
     # (n,), bool: which are angles, or may be: a free coordinate has no unit that says so
     may_turn: NDArray[np.bool_]
     # position, nu, gamma, Phi_q, nonzeros: functions of the contract; `nonzeros` is
@@ -139,10 +150,11 @@ class Code:
     unsolvable: str
     corners: bool  # whether its drivers may have corners
     lanes: LaneFunctions | None  # with the planned solve, where the module has one
-    stages: tuple[Any, ...]  # the staged solve of a module in grouped form, or nothing
+    # Of a module in grouped form with a solve its equations and coordinates in the order of blocks,
+    # sizes of blocks, and which entries of Phi_q vary.
+    blocks: tuple[NDArray[Any], ...]
     # Of a module in grouped form: Phi and the entries of Phi_q at one point.
     evaluate: Callable[..., tuple[Array, Array]] | None
-    arrays: Any  # elementary functions of arrays, for the code of stages
     # march, march_variants: of a compiled module: its own march over times, and of many parameter
     # sets
     march: Callable[..., int] | None
@@ -150,10 +162,10 @@ class Code:
     # Of a module with outputs: puts them and their rates at states (n, N) into (3, r, N).
     observe_into: Callable[..., None] | None
 
-    def covers(self) -> list[slice]:
-        """Return the places of the Euler parameters of each body in space: p and -p are one."""
-        spatial = SPATIAL_COORDINATES
-        return [slice(k + 3, k + count) for _, k, count in self.bodies if count == spatial]
+    def undriven(self) -> str:
+        """Return which drivers are missing, where equations depend on others everywhere; or ""."""
+        describe = vars(self.module).get(UNDRIVEN)
+        return str(describe()) if describe else ""
 
     def owners(self) -> dict[str, str]:
         """Return the body of each coordinate; one that belongs to none stands for itself."""
@@ -192,6 +204,7 @@ def attach(module: ModuleType) -> Code:
     coordinates = names["COORDINATES"]
     places = [range(first, first + count) for _, first, count in names.get("BODIES", ())]
     is_angle = np.array([names["UNITS"][name] == "rad" for name in coordinates], dtype=bool)
+    entries = _entries(names)
     angular = np.array(turning((names["UNITS"][name] for name in coordinates), places), dtype=bool)
     code = Code(
         module=module,
@@ -203,8 +216,12 @@ def attach(module: ModuleType) -> Code:
         guess=names["GUESS"],
         pattern=names["PATTERN"],
         bodies=names.get("BODIES", ()),
+        entries=entries,
+        constant=_constant(entries, len(names["EQUATIONS"]), len(coordinates)),
+        varying=_varying(entries),
         without_guess=_without_guess(names),
         angular=angular,
+        covers=_covers(names.get("BODIES", ())),
         may_turn=is_angle | _without_body(names, coordinates),
         position=names["position"],
         nu=names["nu"],
@@ -222,9 +239,8 @@ def attach(module: ModuleType) -> Code:
         )
         if "solve" in lanes
         else None,
-        stages=names.get("STAGES", ()),
+        blocks=names.get("BLOCKS", ()),
         evaluate=names.get("evaluate"),
-        arrays=names.get("ARRAYS"),
         march=names.get("march"),
         march_variants=names.get("march_variants"),
         observe_into=_observing(names, lanes),
@@ -259,11 +275,47 @@ def _observing(
     return found
 
 
+def _entries(names: Mapping[str, Any]) -> tuple[tuple[int, int, float | None], ...]:
+    """Return row, column and number of the entries of Phi_q."""
+    numbers = names.get("_CONSTANTS", {})
+    if "_FIXED" in names:  # of format 1
+        numbers = dict(zip(names["_FIXED"].tolist(), numbers.tolist(), strict=True))
+    places = names["PATTERN"].tolist() if "LANES" in names else ()
+    return tuple((row, column, numbers.get(k)) for k, (row, column) in enumerate(places))
+
+
+def _constant(
+    entries: Sequence[tuple[int, int, float | None]], equations: int, coordinates: int
+) -> Array:
+    """Return the entries of Phi_q that never change as a matrix."""
+    matrix = np.zeros((equations, coordinates) if entries else (0, 0))
+    for row, column, number in entries:
+        matrix[row, column] = number or 0.0
+    return matrix
+
+
+def _varying(
+    entries: Iterable[tuple[int, int, float | None]],
+) -> tuple[tuple[int, tuple[tuple[int, int], ...]], ...]:
+    """Return the row and the number of the entries of Phi_q that vary, by column."""
+    columns: dict[int, list[tuple[int, int]]] = {}
+    places = ((row, column) for row, column, number in entries if number is None)
+    for place, (row, column) in enumerate(places):
+        columns.setdefault(column, []).append((row, place))
+    return tuple((column, tuple(rows)) for column, rows in columns.items())
+
+
 def _without_guess(names: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the bodies whose guess is zero throughout."""
     given = np.concatenate(((0,), np.cumsum(names["GUESS"] != 0))).tolist()
     bodies = names.get("BODIES", ())
     return tuple(body for body, first, size in bodies if given[first] == given[first + size])
+
+
+def _covers(bodies: Sequence[tuple[str, int, int]]) -> NDArray[np.signedinteger[Any]]:
+    """Return the places of the Euler parameters of each body in space."""
+    first = [k + 3 for _, k, count in bodies if count == SPATIAL_COORDINATES]
+    return np.array(first, dtype=int)[:, np.newaxis] + np.arange(SPATIAL_COORDINATES - 3)
 
 
 def _without_body(names: Mapping[str, Any], coordinates: Sequence[str]) -> NDArray[np.bool_]:

@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kincompile.criteria import SMALLEST_DETERMINANT
-from kincompile.runtime.engine.engine import Point, Rates, rates_agree
+from kincompile.criteria import AGREEMENT, SMALLEST_DETERMINANT, SOLVED
+from kincompile.runtime.engine.linear import Linear, Rates, sizes_of
+from kincompile.runtime.engine.scales import Point
 
 if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array, Code, LaneFunctions
+    from kincompile.runtime.engine.scales import Scales
 
 Lanes = Sequence[Any] | NDArray[np.float64]
 """One lane a coordinate or an equation: a float, or an array (N,) over a batch."""
 
+SLOW = 0.1
+"""Part of its largest speed down to which one coordinate shows how fast all are."""
+
+SEED = 1989
+"""Of the weights of points."""
+
 
 @dataclass(slots=True, eq=False)
-class Planned:
+class Planned(Linear):
     """An engine whose linear systems go by the elimination that was planned at compile time."""
 
     code: Code  # a module with a planned solve
@@ -55,30 +64,75 @@ class Planned:
         own, functions = self._own
         return own.solve(functions, point.factors[0], b)
 
-    def solve_transposed(self, point: Point, b: Array) -> Array:
-        """Return x of Phi_q^T x = b: column by column of the inverse, which the plan knows."""
-        n = len(self.code.equations)
-        sides = np.eye(n)[:, :, np.newaxis]
-        columns = (stacked(self.solve(point, side), point.q.shape[1]) for side in sides)
-        return np.array([np.sum(b * column, axis=0) for column in columns])
-
-    def velocity_and_acceleration(self, point: Point) -> tuple[Lanes, Lanes]:
-        """Return the rates at a point, one lane a coordinate."""
+    def velocity_and_acceleration(self, point: Point) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+        """Return nu, q_dot, gamma and q_ddot at a point, one lane an equation or coordinate."""
         own, functions = self._own
-        q_dot = self.solve(point, own.nu(functions, point.q, point.t, self.p))
+        nu = own.nu(functions, point.q, point.t, self.p)
+        q_dot = self.solve(point, nu)
         gamma = own.gamma(functions, point.q, q_dot, point.t, self.p)
-        return q_dot, self.solve(point, gamma)
+        return nu, q_dot, gamma, self.solve(point, gamma)
 
-    def rates(self, point: Point, besides: Array | None) -> Rates:
-        """Return the rates at a point, and x of Phi_q x = besides if that is asked for."""
-        q_dot, q_ddot = self.velocity_and_acceleration(point)
+    def rates(
+        self, point: Point, besides: Array | None, into: tuple[Array, Array] | None = None
+    ) -> Rates:
+        """Return the rates at a point, in arrays (n, N) that are given or new ones; see there."""
+        nu, q_dot, gamma, q_ddot = self.velocity_and_acceleration(point)
         movement = () if besides is None else self.solve(point, besides)
         points = point.q.shape[1]
-        found = Rates(*(stacked(part, points) for part in (q_dot, q_ddot, movement)))
-        if self.code.redundant:  # the elimination leaves them out
-            states = point.q, found.q_dot, found.q_ddot
-            return replace(found, agree=rates_agree(self.code, point.t, self.p, states))
-        return found
+        velocity, acceleration = into or np.empty((2, len(q_dot), points))
+        fill(velocity, q_dot)
+        fill(acceleration, q_ddot)
+        return Rates(velocity, acceleration, stacked(movement, points), nu, gamma)
+
+    def missing(self, point: Point, x: Array, b: Lanes) -> Lanes:
+        """Return Phi_q x - b, a row each."""
+        rows, varying = [-right for right in b], iter(point.Phi_q)
+        for row, column, number in self.code.entries:
+            rows[row] = rows[row] + (next(varying) if number is None else number) * x[column]
+        return rows
+
+    def meet(self, scales: Scales, point: Point, rates: Rates) -> Any:
+        """Say where the equations of rates hold; all together, where all points of a batch do."""
+        together = self._meet_together(scales, point, rates)
+        return together or Linear.meet(self, scales, point, rates)
+
+    def parts(self, scales: Scales, point: Point) -> Array:
+        """Return what each equation may be missed by; the solve leaves some of them out."""
+        code, part = scales.code, np.asarray(SOLVED)
+        if code.redundant:
+            part = np.where(np.isin(code.equations, code.redundant), AGREEMENT, SOLVED)
+        return np.asarray(part * scales.magnitude)
+
+    def _meet_together(self, scales: Scales, point: Point, rates: Rates) -> bool:
+        """Say whether all points of a batch meet together what each of them must meet.
+
+        They do nearly always, and one number a row costs less than a mask. Velocities and
+        accelerations are divided by their sizes and added up with weights of size 1/2 to 1, drawn
+        at random with their signs: no errors cancel. Nearly always one coordinate shows how fast
+        all are, and gives the sizes.
+        """
+        middle = np.abs(rates.q_dot[:, rates.q_dot.shape[1] // 2]) / scales.reference
+        fast = int(np.argmax(middle))
+        speed = np.abs(rates.q_dot[fast]) / scales.reference[fast]
+        growth = speed * speed
+        if not speed.min() > SLOW * speed.max():  # it turns back, or all are at rest
+            speed, growth = sizes_of(scales, rates)
+        parts = self.parts(scales, point)
+        q_dot, q_ddot = rates.q_dot, rates.q_ddot
+        weights = weights_of_points(speed.size)
+        first, second = weights[0] / speed, weights[1] / growth
+        sums = q_dot @ first + q_ddot @ second
+        rows = (self.code.constant @ sums).tolist()
+        for row, (nu, gamma) in enumerate(zip(rates.nu, rates.gamma, strict=True)):
+            rows[row] -= sum_of(first, nu) + sum_of(second, gamma)
+        x, part = np.empty_like(first), np.empty_like(first)
+        for column, entries in self.code.varying:
+            np.multiply(q_dot[column], first, out=x)
+            np.multiply(q_ddot[column], second, out=part)
+            x += part
+            for row, place in entries:
+                rows[row] += sum_of(x, point.Phi_q[place])
+        return bool((np.abs(rows) <= 0.5 * parts).all())
 
     def determinants(self, point: Point, before: Point | None = None) -> Array:
         """Return the determinants of the blocks, shape (blocks, N)."""
@@ -90,17 +144,42 @@ class Planned:
         return tuple(np.sign(self.determinants(point)[:, 0]).tolist())
 
 
+@lru_cache(maxsize=16)
+def weights_of_points(count: int) -> Array:
+    """Return numbers of size 1/2 to 1 and either sign, drawn at random, (2, count)."""
+    drawn = np.random.default_rng(SEED).uniform(-0.5, 0.5, (2, count))
+    weights = np.asarray(drawn + np.copysign(0.5, drawn))
+    weights.setflags(write=False)
+    return weights
+
+
+def sum_of(weights: Array, lane: Any) -> Any:
+    """Return the weighted sum of a lane, which may be one number for all points."""
+    if isinstance(lane, np.ndarray):
+        return weights.dot(lane)
+    return lane * weights.sum() if lane else 0.0
+
+
 def stacked(lanes: Lanes, points: int) -> Array:
     """Return lanes, some of which may be one number for all points, as an array (..., N)."""
     result = np.empty((len(lanes), points))
-    for row, lane in zip(result, lanes, strict=True):
-        row[:] = lane
+    fill(result, lanes)
     return result
 
 
-def trusted(determinants: Array) -> NDArray[np.bool_]:
-    """Return at which of N points elimination can be trusted, by determinants (blocks, N)."""
+def fill(rows: Array, lanes: Lanes) -> None:
+    """Write lanes into the rows of an array (..., N)."""
+    for row, lane in zip(rows, lanes, strict=True):
+        row[:] = lane
+
+
+def trusted(missed: Array, determinants: Array) -> NDArray[np.bool_]:
+    """Return at which of N points solves by elimination can be trusted.
+
+    They are by what part of their terms equations are missed, (N,), and by determinants,
+    (blocks, N): near a singular configuration errors are large though the equations hold.
+    """
     sizes = np.abs(determinants)
     smallest = SMALLEST_DETERMINANT * np.max(sizes, axis=1, initial=0.0, where=sizes < np.inf)
     found: NDArray[np.bool_] = np.all(sizes > smallest[:, np.newaxis], axis=0)
-    return found
+    return found & (missed <= SOLVED)

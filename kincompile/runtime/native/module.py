@@ -18,7 +18,7 @@ from kincompile import quantities
 from kincompile.errors import InputError
 from kincompile.runtime.contract import present_in
 from kincompile.runtime.engine.code import WRITTEN, attach
-from kincompile.runtime.memory import LINE, empty
+from kincompile.runtime.memory import empty
 from kincompile.runtime.native.library import library
 from kincompile.runtime.native.points import (
     Places,
@@ -52,6 +52,10 @@ if TYPE_CHECKING:
 
 BATCH_LAST = ("Phi", "nonzeros", "nu", "gamma")
 """What `kinematics_batch_last` returns."""
+
+
+LINE = 64 // NUMBER
+"""Numbers of a cache line: C writes whole lines past the caches, in a third of the time."""
 
 
 def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
@@ -228,9 +232,10 @@ class _Functions:
     def solve(self) -> Function:
         """Return the planned solve."""
         original, run = self._module.solve, getattr(self._library, f"{self._name}_solve")
+        check: Function = vars(self._module)["_system"]
 
         def solve(nonzeros: Any, b: Any) -> Any:
-            nonzeros, b = np.asarray(nonzeros), np.asarray(b)
+            nonzeros, b = check(nonzeros, b)
             if "c" in (nonzeros.dtype.kind, b.dtype.kind):
                 return original(nonzeros, b)
             shape = np.broadcast_shapes(nonzeros.shape[:-1], b.shape[:-1])
@@ -389,6 +394,8 @@ def _in_lines(size: int, points: int) -> Array:
 
     The rows are an odd number of lines apart: at powers of two they would get in each other's way.
     """
-    lines = -(-points * NUMBER // LINE) | 1
-    rows: Array = empty((size, lines * LINE // NUMBER))[:, :points]
+    width = (-(-points // LINE) | 1) * LINE
+    numbers = empty((size * width + LINE,))
+    start = -numbers.ctypes.data // NUMBER % LINE
+    rows: Array = numbers[start : start + size * width].reshape(size, width)[:, :points]
     return rows

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 
-from kincompile.criteria import MAX_CORRECTIONS, TOLERANCE
+from kincompile.criteria import MAX_CORRECTIONS, SLIGHT, TOLERANCE
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, State, all_hold
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Between: TypeAlias = Generator[float, None, T]
-
-KINK = 1e-6
-"""Rate, relative to an output's largest, with which it changes its sign at a corner."""
 
 SHARP = 1e-2
 """The same, where the rate is a difference: its jump over twice the distance `APART`."""
@@ -92,7 +89,7 @@ class ObservedMotion:
     def has_corner(self, t: float, k: int, rate: float, most: float) -> Between[bool]:
         """Say whether an output turns back in a corner, where its rate jumps, at most by `most`."""
         if self.emitted[k]:
-            return not abs(rate) <= KINK * most
+            return not abs(rate) <= SLIGHT * most
         h = APART * self.span
         before, here, after = yield from self.values([t - h, t, t + h], k)
         bend = before - 2 * here + after
@@ -148,7 +145,7 @@ class ObservedMotion:
     def march(self) -> March:
         """What follows the motion."""
         start = self.position(0)
-        equations = problem(self._module, self.p, start, self.t[0], staged=True)
+        equations = problem(self._module, self.p, start, self.t[0], sparse=True)
         return March(equations, equations.engine, TOLERANCE)
 
     def nearest(self, t: float) -> int:

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import RANK, probe_of
+from kincompile.criteria import HALF, RANK, TINY, probe_of
 from kincompile.errors import InputError, SingularConfigurationWarning
 from kincompile.html import Shown
 from kincompile.names import listed, multiplier
 from kincompile.runtime.engine.code import FORCES, code_of, on_request
+from kincompile.runtime.engine.dense import powers_of_rows
 from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.columns import largest
@@ -37,9 +38,6 @@ if TYPE_CHECKING:
 
 BALANCED = 1e-7
 """Part of the largest force up to which the equations may be out of balance."""
-
-MOVED = 1e-8
-"""Change of a force, relative to that of the multipliers, that shows that it is not determined."""
 
 BLOCK = 2000
 """Points at a time where singular values are taken."""
@@ -374,7 +372,7 @@ class _Points:
         if (module := self.modules.compiled(True)) is not None:
             values = self.outputs_of(module, self.p)
             blocks = len(values) - len(names)
-            found, left = values[blocks:], finite & ~trusted(values[:blocks])
+            found, left = values[blocks:], finite & ~trusted(values[0], values[1:blocks])
         else:
             found = np.empty((len(names), self.t.size))
         if not finite.all():
@@ -430,6 +428,8 @@ class _Points:
         states = self.q, self.q_dot, self.q_ddot
         own = self.code.module
         matrix = self.code.Phi_q(self.q, self.t, self.p)
+        powers = powers_of_rows(matrix)
+        matrix = powers[:, :, np.newaxis] * matrix
         inertia = np.einsum("lij,lj->li", own.M(self.q, self.t, self.p), self.q_ddot)
         loads = own.Q(*states[:2], self.t, self.p)
         sides = loads - inertia
@@ -442,12 +442,12 @@ class _Points:
         # Multipliers that do no work, mixed so that each shows wherever one of them does.
         idle = np.concatenate((zero, np.ones((len(zero), len(left[0]) - size), dtype=bool)), axis=1)
         mixed = np.where(idle, probe_of(idle.shape[1]), 0.0)
-        loose = np.einsum("lij,lj->li", left, mixed)
+        loose = powers * np.einsum("lij,lj->li", left, mixed)
         moved = np.abs(self._given(module, loose) - self._given(module, 0 * loose))
-        found = self._given(module, factors)
-        is_shared = moved > MOVED * np.abs(loose).max(axis=-1, keepdims=True, initial=0.0)
+        found = self._given(module, powers * factors)
+        is_shared = moved > HALF * np.abs(loose).max(axis=-1, keepdims=True, initial=0.0)
         rest = np.abs(np.einsum("lij,li->lj", matrix, factors) - sides).max(axis=-1)
-        off = rest > BALANCED * (np.abs(loads) + np.abs(inertia)).max(axis=-1, initial=1e-300)
+        off = rest > BALANCED * (np.abs(loads) + np.abs(inertia)).max(axis=-1, initial=TINY)
         found[is_shared] = np.nan
         found[off] = np.nan
         return found, np.asarray(is_shared[~off].any(axis=0))

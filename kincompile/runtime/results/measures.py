@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import ROOT_LENGTH, SOLVED, STILL, ZERO
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.results.between import ObservedMotion, alone, derivative, together
@@ -35,17 +36,8 @@ if TYPE_CHECKING:
     from kincompile.runtime.results.between import Between
     from kincompile.runtime.results.columns import MotionTable
 
-STILL = 1e-11
-"""Movement, relative to the largest number of the same unit, that is a rounding error."""
-
-AT_REST = 1e-10
-"""Rate, relative to an output's largest, that is zero."""
-
 SAME = 1e-7
 """Difference, relative to its stroke, up to which an output repeats itself."""
-
-LOCATED = 1e-13
-"""Part of the span of times to which a zero is located."""
 
 ROOT_STEPS = 60
 """Steps of the search for a zero: as many halvings as there are bits."""
@@ -199,7 +191,7 @@ def _dead_points(motion: ObservedMotion, k: int) -> Between[tuple[list[float], l
     most = float(np.max(np.abs(y_dot), initial=0.0, where=np.isfinite(y_dot)))
     if np.ptp(y) <= STILL * motion.scale(k) or not most > 0:
         return [], []
-    signs = np.sign(np.where(np.abs(y_dot) > AT_REST * most, y_dot, 0.0))
+    signs = np.sign(np.where(np.abs(y_dot) > SOLVED * most, y_dot, 0.0))
     found, kinks = _rests(t, signs), []
     for a in _steps_with_zeros(t, signs, y_dot, y_ddot):
         brackets = yield from _brackets(motion, k, a, signs, y_dot, y_ddot)
@@ -255,7 +247,7 @@ def _zero(motion: ObservedMotion, k: int, low: float, high: float) -> Between[tu
     Newton's method, or secants where no second rate is emitted, with a bisection where either
     leaves the bracket. At a corner there is no zero: the sign changes there.
     """
-    smallest = LOCATED * motion.span
+    smallest = ROOT_LENGTH * motion.span
     _, at_low, _ = yield from motion.at(low, k)
     before = low
     rate_before, t = at_low, (low + high) / 2
@@ -308,7 +300,7 @@ def _period(motion: ObservedMotion, k: int, dead: list[float]) -> Between[float 
 def _repeats(motion: ObservedMotion, k: int, first: float, period: float) -> Between[bool]:
     """Say whether an output and its rate are the same one period later, at some times."""
     start, end = float(motion.t[0]), float(motion.t[-1])
-    slack = 1e-9 * motion.span
+    slack = ZERO * motion.span
     rates = np.abs(motion.y_dot[:, k])
     limits = np.array([np.ptp(motion.y[:, k]), rates.max(initial=0.0, where=np.isfinite(rates))])
     spread = np.linspace(start, max(start, end - period), 4).tolist()

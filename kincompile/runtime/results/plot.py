@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.criteria import STILL
 from kincompile.errors import package_of_extra
 from kincompile.runtime.results.columns import ANGLE_UNITS, TIME_UNIT, titled
 from kincompile.runtime.results.html import figure_html
@@ -42,9 +43,6 @@ SET_COLOURS = "viridis"
 
 MARKED = 24
 """Points at equal times on a path, at least."""
-
-STILL = 1e-12
-"""Movement, relative to the largest number of the same unit, that is a rounding error."""
 
 GAP, EVENT = "0.88", "tab:red"
 """Colours of the times without a solution, and of events."""

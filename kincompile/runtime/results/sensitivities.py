@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from kincompile.criteria import AGREEMENT, SOLVED
 from kincompile.errors import InputError
 from kincompile.html import Shown
 from kincompile.names import (
@@ -28,7 +29,7 @@ from kincompile.names import (
     suggestion,
 )
 from kincompile.runtime.engine.code import SENSITIVITIES, code_of, on_request
-from kincompile.runtime.engine.engine import agree
+from kincompile.runtime.engine.dense import powers_of_rows
 from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.memory import empty
@@ -80,7 +81,7 @@ class Sensitivities(Shown):
         Unit of each coordinate, output and parameter.
     second : ndarray, shape (3, N, n + r, k, k), or None
         Second derivatives of coordinates and outputs, of their rates and second rates; NaN also
-        where Phi_q is nearly singular.
+        where Phi_q is nearly singular, or the planned elimination misses its equations.
     """
 
     t: Array
@@ -324,13 +325,21 @@ def _require_agreement(points: _Points, mechanism: str) -> None:
     """Refuse parameters that would take apart a mechanism with redundant equations."""
     matrices, sides = points.slopes()
     moved = np.linalg.pinv(matrices)[:, np.newaxis] @ sides[..., np.newaxis]
-    is_met = np.mean(agree(matrices[:, np.newaxis], moved[..., 0], sides), axis=0) > 1 / 2
+    is_met = _are_met(matrices[:, np.newaxis], moved[..., 0], sides, AGREEMENT).mean(axis=0) > 1 / 2
     if wrong := [name for name, met in zip(points.names, is_met, strict=True) if not met]:
         raise InputError(
             f"{mechanism} has redundant equations, {listed(points.code.redundant)}, which would no "
             f"longer agree with the others if {listed(wrong)} changed alone: it could not be "
             "assembled. Make one parameter of all dimensions that have to change together."
         )
+
+
+def _are_met(matrix: Array, rates: Array, sides: Array, part: float) -> NDArray[np.bool_]:
+    """Say at which of (..., n) rates all equations are met, up to a part of the largest terms."""
+    rates = rates[..., np.newaxis]
+    terms = (np.abs(matrix) @ np.abs(rates))[..., 0] + np.abs(sides)
+    missing = np.abs((matrix @ rates)[..., 0] - sides)
+    return np.asarray(np.max(missing, axis=-1) <= part * np.max(terms, axis=-1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -367,7 +376,7 @@ class _Points:
         code.observe_into((self.q, self.q_dot, self.q_ddot), self.t, self.p, seen)
         blocks = len(module.OUTPUTS) - math.prod(size)
         found: Array = seen[:, blocks:].reshape(3, *size, -1)
-        return found, trusted(seen[0, :blocks])
+        return found, trusted(seen[0, 0], seen[0, 1:blocks])
 
     def slopes(self) -> tuple[Array, Array]:
         """Return Phi_q, (L, m, n), and -Phi_a of each parameter, (L, k, m)."""
@@ -382,13 +391,16 @@ class _Points:
         m, n, k = len(self.code.equations), len(self.code.coordinates), len(self.names)
         q, q_dot, q_ddot, t, p = self.q.T, self.q_dot.T, self.q_ddot.T, self.t, self.p.T
         matrices, first = self.slopes()
-        inverses = np.linalg.pinv(matrices)
+        powers = powers_of_rows(matrices)[:, np.newaxis]
+        even, part = powers.swapaxes(1, 2) * matrices, AGREEMENT if self.code.redundant else SOLVED
+        inverses = np.linalg.pinv(even)
 
         def solved(sides: Array) -> Array:
             """Return derivatives, (L, k n), for right sides below the mechanism's own."""
             own = sides.reshape(-1, k, m)
-            found: Array = np.einsum("lij,lkj->lki", inverses, own).reshape(-1, k * n)
-            return found
+            found: Array = np.einsum("lij,lkj->lki", inverses, powers * own)
+            found[~_are_met(even[:, np.newaxis], found, powers * own, part)] = np.nan
+            return found.reshape(-1, k * n)
 
         every_q = np.concatenate((q, solved(first)), axis=1)
         coupling = _coupling(larger, every_q, t, p, m, n)

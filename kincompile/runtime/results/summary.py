@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import NOISE
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.status import Status
 from kincompile.tables import counted, table
@@ -14,9 +15,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.results.solution import Solution
-
-NOISE = 1e-12
-"""Rounding errors, relative to the largest number of a kind."""
 
 _NUMBERS = ("min", "at t", "max", "max |speed|", "max |acceleration|")
 

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import SAME_POSITION
+from kincompile.criteria import SAME_POSITION, SMALL_CORRECTION
 from kincompile.errors import InputError
 from kincompile.names import listed
+from kincompile.runtime.corrector import iterate, safeguarded_step
+from kincompile.runtime.engine.scales import norm
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.newton import iterate, safeguarded_step, unwound
-from kincompile.runtime.problem import norm, problem
+from kincompile.runtime.problem import problem
+from kincompile.runtime.start import unwound
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -21,8 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.engine import Array as Vector
-    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.engine.linear import Array as Vector
+    from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.inputs import Inputs, Values
     from kincompile.runtime.problem import Problem
 
@@ -36,8 +38,8 @@ PATIENCE = 6
 """The search ends when it has tried this many times the starts after which the last way to assemble
 was found."""
 
-TOLERANCE, MAX_ITERATIONS = 1e-12, 40
-"""Of Newton's method from each start."""
+MAX_ITERATIONS = 40
+"""Iterations of Newton's method from each start."""
 
 MOST_COORDINATES = 60
 """Coordinates up to which a start is looked at that chooses no assembly: a search takes seconds in
@@ -83,7 +85,7 @@ def assemblies(module: ModuleType, t: float = 0.0, p: Values = None) -> Vector:
     positions, of which there may be infinitely many together, count where Newton's method
     ends.
     """
-    inputs = read_inputs(module, t, p, None, TOLERANCE, MAX_ITERATIONS)
+    inputs = read_inputs(module, t, p, None, SMALL_CORRECTION, MAX_ITERATIONS)
     if inputs.t.size > 1:
         raise InputError(
             f"assemblies are those of one time, got {inputs.t.size}: call it for each."
@@ -101,7 +103,7 @@ def assembled_positions(inputs: Inputs) -> Vector:
         for k, start in enumerate(spread_starts(equations, inputs.guess), 1):
             point = _assembled(equations, time, start)
             if point is not None:
-                q = unwound(equations, time, point, inputs.guess, TOLERANCE).q
+                q = unwound(equations, time, point, inputs.guess, SMALL_CORRECTION).q
                 if is_new(equations, q, found):
                     found.append(q)
                     last = k
@@ -113,7 +115,7 @@ def assembled_positions(inputs: Inputs) -> Vector:
 
 def is_new(equations: Problem, q: Vector, others: Iterable[Vector]) -> bool:
     """Say whether a position is none of others, whatever whole turns lie between."""
-    return all(distance_modulo_turns(equations, q, other) > SAME_POSITION for other in others)
+    return all(equations.distance(q, other) > SAME_POSITION for other in others)
 
 
 def assembly_guess(inputs: Inputs, number: object) -> Vector:
@@ -140,7 +142,7 @@ def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
         return ""
     found = assembled_positions(inputs)
     equations = _equations(inputs)
-    away = [distance_modulo_turns(equations, q, other) for other in found]
+    away = [equations.distance(q, other) for other in found]
     if len(found) < 2:
         return ""
     taken = int(np.argmin(away))
@@ -178,7 +180,7 @@ def _is_open(inputs: Inputs, q: Vector, without: Sequence[str]) -> bool:
     mirrored = q.copy()
     mirrored[angles] = -q[angles]
     found = _assembled(equations, time, mirrored)
-    if found is None or distance_modulo_turns(equations, q, found.q) <= SAME_POSITION:
+    if found is None or equations.distance(q, found.q) <= SAME_POSITION:
         return False
     other = found.q
     here, there = (
@@ -222,23 +224,14 @@ def spread_starts(equations: Problem, guess: Vector) -> Vector:
 def _assembled(equations: Problem, t: float, start: Vector) -> Point | None:
     """Return where Newton's method ends, plain or safeguarded; None where it does not converge."""
     for step in (None, safeguarded_step):
-        attempt = iterate(equations, t, start, TOLERANCE, MAX_ITERATIONS, step)
+        attempt = iterate(equations, t, start, SMALL_CORRECTION, MAX_ITERATIONS, step)
         if attempt.status is Status.CONVERGED:
             return attempt.last
     return None
 
 
-def distance_modulo_turns(equations: Problem, q: Vector, other: Vector) -> float:
-    """Return how far two positions are apart, angles modulo a turn."""
-    return float(np.max(np.abs(_difference(equations, q, other)), initial=0.0))
-
-
 def _difference(equations: Problem, q: Vector, other: Vector) -> Vector:
-    away = (q - other) / equations.reference
-    for cover in equations.code.covers():  # p and -p are one orientation
-        if q[cover] @ other[cover] < 0:
-            away[cover] = q[cover] + other[cover]
-    return np.where(equations.angular, np.remainder(away + math.pi, math.tau) - math.pi, away)
+    return equations.apart(q, other) / equations.reference
 
 
 def _rank(equations: Problem, q: Vector, guess: Vector) -> tuple[float, ...]:

@@ -1,7 +1,7 @@
 r"""The branch of a motion: the signs of the determinants of the structural blocks of Phi_q.
 
 Two assembled positions of a mechanism that differ in a sign cannot be reached from each other
-without passing a singular configuration. The planned solve of a module, in one piece or in stages,
+without passing a singular configuration. The planned solve of a module, in one piece or in blocks,
 has the determinants at hand.
 """
 
@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.runtime.engine.code import Array, Code, code_of
+from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.engine.planned import Planned
-from kincompile.runtime.engine.staged import Staged
-from kincompile.runtime.problem import Dense
+from kincompile.runtime.engine.sparse import Sparse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -45,7 +45,7 @@ def signatures(module: ModuleType, q: Array, t: Array, p: Sequence[float]) -> Si
 def _signs(code: Code, q: Array, t: Array, p: Array) -> Iterator[Array]:
     """Yield the signs of known positions, some at a time."""
     if code.lanes is None:
-        engine = Staged(code, p) if code.stages else Dense(code, p)
+        engine = Sparse(code, p) if code.blocks else Dense(code, p)
         for position, time in zip(q, t.tolist(), strict=True):
             yield np.array([engine.signs(engine.evaluate(np.ascontiguousarray(position), time))])
         return

@@ -11,7 +11,7 @@ from kincompile.runtime.problem import problem
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from kincompile.runtime.engine.engine import Array as Vector
+    from kincompile.runtime.engine.linear import Array as Vector
 
 BLOCK = 512
 """Points at a time, so that memory is bounded."""

@@ -26,22 +26,21 @@ from kincompile.criteria import (
     ROOT_LENGTH,
     ROOT_STEPS,
     SHORTEST_ARC,
+    SLIGHT,
     SMALL_CORRECTION,
     STRAIGHT,
     TOLERABLE_CORRECTION,
 )
-from kincompile.runtime.problem import solve_linear, weights_of
+from kincompile.runtime.engine.dense import solve_linear
+from kincompile.runtime.engine.scales import weights_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from kincompile.runtime.engine.engine import Array as Vector
-    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.engine.linear import Array as Vector
+    from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.march import State
     from kincompile.runtime.problem import Problem
-
-ROUGHLY = 1e-6
-"""Imaginary part of a root, relative to its real part, that is a rounding error."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,7 +158,7 @@ class Curve:
         ])  # fmt: skip
         coefficients = np.linalg.solve(powers, values)
         roots = np.roots(coefficients[:, -1])
-        real = roots.real[np.abs(roots.imag) <= np.abs(roots.real) * ROUGHLY + ROUGHLY]
+        real = roots.real[np.abs(roots.imag) <= np.abs(roots.real) * SLIGHT + SLIGHT]
         x = float(real[np.argmin(np.abs(real))]) if real.size else 0.0
         y = np.vander([x], len(AROUND_OFFSETS))[0] @ coefficients[:, :-1]
         place = self._place(y[:-1], float(y[-1]), first.tangent)

@@ -14,22 +14,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import (
-    AT_EVENT,
-    IN_RANGE,
-    INVOLVED,
-    LATE,
-)
+from kincompile.criteria import AROUND, AT_EVENT, IN_RANGE, INVOLVED, LATE
 from kincompile.html import Shown
 from kincompile.names import listed
+from kincompile.runtime.grid import HERMITE
 from kincompile.runtime.march import March, Outcome, State
 from kincompile.runtime.singular.curve import Bracket, Curve
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Code
-    from kincompile.runtime.engine.engine import Array as Vector
-    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.engine.linear import Array as Vector
+    from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.problem import Problem
 
     Motion = tuple[Vector, Vector, Vector]
@@ -64,10 +60,6 @@ DOUBTS = {
     "remedy": "kc.assemblies gives all of them, and each serves as a guess.",
 }
 """What is said of a start that may not be the one that is meant."""
-
-PASSAGE = 2e-3
-"""Half of the piece of curve around a bifurcation, in radians and sizes of the mechanism, over
-which the motion is interpolated: beyond it Phi_q is good to ten digits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -126,21 +118,13 @@ def quintic(t0: float, first: Motion, t1: float, last: Motion, t: float) -> Moti
     """Return position, velocity and acceleration between two points of a motion that have them."""
     h = t1 - t0
     left, right = (np.array([x[0], h * x[1], h * h * x[2]]) for x in (first, last))
-    coefficients = np.concatenate((left[:2], left[2:] / 2, _QUINTIC @ np.vstack((left, right))))
+    coefficients = HERMITE.T @ np.vstack((left, right))
     s = (t - t0) / h
     powers = s ** np.arange(6)
     order = np.arange(1, 6)
     rates = np.append(0.0, order * powers[:5])
     second = np.append([0.0, 0.0], (order * (order - 1))[1:] * powers[:4])
     return powers @ coefficients, rates @ coefficients / h, second @ coefficients / h**2
-
-
-_QUINTIC = np.array([
-    [-10, -6, -1.5, 10, -4, 0.5],
-    [15, 8, 1.5, -15, 7, -1],
-    [-6, -3, -0.5, 6, -3, 0.5],
-])  # fmt: skip
-"""Coefficients of s^3, s^4, s^5 from q, h q_dot, h^2 q_ddot at both ends of the interval."""
 
 
 def locate(march: March, state: State, latest: float) -> tuple[Event, Passage | None] | None:
@@ -178,7 +162,7 @@ def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
     if not (np.isfinite(nu).all() and np.isfinite(point.Phi_q).all()):
         return None
     weights = equations.weights()
-    basis, sizes, _ = np.linalg.svd(_scaled(equations, point.Phi_q), full_matrices=False)
+    basis, sizes, _ = np.linalg.svd(equations.scaled(point.Phi_q), full_matrices=False)
     missing = basis[:, sizes <= IN_RANGE * sizes[0]].T @ (weights * nu)
     demanded = float(np.linalg.norm(missing)) > IN_RANGE * float(np.linalg.norm(weights * nu))
     kind = LOCK_UP if demanded else BIFURCATION
@@ -189,14 +173,15 @@ def status_after(event: Event, outcome: Outcome, t: float) -> Status:
     """Return the status of a point at which an event has ended the motion.
 
     How Newton's method fails there rounding decides: beyond a lock-up there is no position that
-    continues the motion, as there is none where it would have to jump; at a lock-up or a
-    bifurcation, and beyond one, Phi_q is singular.
+    continues the motion, and none where it would have to jump; at a lock-up, and at and beyond a
+    bifurcation, Phi_q is singular.
     """
     if outcome.position is not None or outcome.status is Status.NOT_FINITE:
         return outcome.status
     is_there = abs(event.t - t) <= AT_EVENT * max(abs(event.t), abs(t))
-    is_singular = event.kind == BIFURCATION or (event.kind == LOCK_UP and is_there)
-    return Status.SINGULAR if is_singular else Status.NOT_CONVERGED
+    if event.kind == BRANCH_SWITCH:
+        return Status.NOT_CONVERGED
+    return Status.LOCK_UP if event.kind == LOCK_UP and not is_there else Status.SINGULAR
 
 
 def branch_switch(code: Code, state: State, t: float, q: Vector, reference: Vector) -> Event:
@@ -211,7 +196,7 @@ def branch_switch(code: Code, state: State, t: float, q: Vector, reference: Vect
 
 def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) -> Event:
     """Name what moves, and say what to do."""
-    _, sizes, directions = np.linalg.svd(_scaled(equations, Phi_q))
+    _, sizes, directions = np.linalg.svd(equations.scaled(Phi_q))
     null = directions[-1] / directions[-1][np.argmax(np.abs(directions[-1]))]
     code = equations.code
     # Equal loops become singular together: then several movements are free.
@@ -221,11 +206,6 @@ def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) ->
         kind, t, bodies, SENTENCES[kind].format(t=f"{t:.10g}", bodies=listed(bodies)), q,
         dict(zip(code.coordinates, null.tolist(), strict=True)),
     )  # fmt: skip
-
-
-def _scaled(equations: Problem, Phi_q: Vector) -> Vector:
-    """Return Phi_q in scales of equations and coordinates."""
-    return equations.weights()[:, np.newaxis] * Phi_q * equations.reference
 
 
 def involved(code: Code, movement: Vector) -> tuple[str, ...]:
@@ -239,7 +219,7 @@ def involved(code: Code, movement: Vector) -> tuple[str, ...]:
 def _passage(march: March, curve: Curve, bracket: Bracket, at: float) -> Passage | None:
     """Return the motion on both sides of a bifurcation."""
     sides = []
-    for length in (at - PASSAGE, at + PASSAGE):
+    for length in (at - AROUND, at + AROUND):
         place = curve.step(bracket.first, length)
         point = place and curve.equations.at(place.q, place.t)
         state = point and march.state(point)

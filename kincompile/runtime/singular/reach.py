@@ -10,15 +10,17 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import ASSEMBLED, SAME_POSITION
+from kincompile.criteria import SAME_POSITION, ZERO
+from kincompile.runtime.corrector import nearest
+from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.march import State
-from kincompile.runtime.problem import Dense
-from kincompile.runtime.singular.assemblies import MOST_COORDINATES, distance_modulo_turns
+from kincompile.runtime.singular.assemblies import MOST_COORDINATES
 from kincompile.runtime.singular.curve import Curve
+from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -26,21 +28,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Array
-    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.problem import Problem
     from kincompile.runtime.singular.curve import CurvePoint
-
-EXACT = 1e-9
-"""Part of the numbers by which values at different positions may differ and be the same."""
 
 PLACES = 3
 """Positions without a pattern at which the form of an equation is seen."""
 
 MOST_TURNS = 24
 """Extremes after which a curve is given up."""
-
-CORRECTIONS = 60
-"""Corrections of a position towards the equations that are left."""
 
 LATER = (0.0, 0.01, 0.3, 2.0)
 """Times after one that is looked at, at which a driver may move."""
@@ -89,10 +85,10 @@ def measure(equations: Problem, row: int, q: Array, t: float) -> Measure | None:
     for columns in _origins(equations, known[0][2]):
         unit = code.units[code.coordinates[columns[0]]]
         squares = [float(slope[columns] @ slope[columns]) for _, _, slope in known]
-        if all(abs(square - 1) <= EXACT for square in squares):
+        if all(abs(square - 1) <= ZERO for square in squares):
             return Measure(unit, None)
         offsets = [square / 4 - Phi for square, (_, Phi, _) in zip(squares, known, strict=True)]
-        if np.ptp(offsets) <= EXACT * max(squares) and min(offsets) > 0:
+        if np.ptp(offsets) <= ZERO * max(squares) and min(offsets) > 0:
             return Measure(unit, offsets[0], is_square=True)
     return None
 
@@ -101,8 +97,8 @@ def _of_angles(known: Sequence[tuple[Array, float, Array]]) -> Measure | None:
     """Return the measure of an equation of angles, whose gradient is constant."""
     slope = known[0][2]
     offsets = [float(slope @ q - Phi) for q, Phi, _ in known]
-    same = all(np.allclose(other, slope, rtol=0, atol=EXACT) for _, _, other in known)
-    if not same or np.ptp(offsets) > EXACT * (1 + max(map(abs, offsets))):
+    same = all(np.allclose(other, slope, rtol=0, atol=ZERO) for _, _, other in known)
+    if not same or np.ptp(offsets) > ZERO * (1 + max(map(abs, offsets))):
         return None
     return Measure("rad", offsets[0])
 
@@ -195,17 +191,14 @@ def _span(equations: Problem, row: int, q: Array, t: float) -> tuple[float, floa
 
 def _with_the_others(equations: Problem, row: int, q: Array, t: float) -> Point | None:
     """Return a position near one at which all equations but one hold; None where none is found."""
-    rest = np.arange(q.size) != row
-    for _ in range(CORRECTIONS):
-        point = equations.at(q, t)
-        if point is None or not np.isfinite(point.Phi_q).all():
-            return None
-        if (np.abs(point.Phi[rest]) <= ASSEMBLED * equations.magnitude[rest]).all():
-            return point
-        scale = equations.reference
-        change = np.linalg.lstsq(point.Phi_q[rest] * scale, point.Phi[rest], rcond=1e-9)[0]
-        q = q - scale * change * min(1.0, 1.0 / float(np.max(np.abs(change)) or 1.0))
-    return None
+    rest = np.where(np.arange(q.size) == row, 0.0, 1.0)
+
+    def position(q: Array, t: float, p: Array) -> tuple[Array, Array]:
+        Phi, Phi_q = equations.code.position(q, t, p)
+        return rest * Phi, rest[:, np.newaxis] * Phi_q
+
+    attempt = nearest(_with_position(equations, position), t, q)
+    return equations.at(attempt.last.q, t) if attempt.status is Status.CONVERGED else None
 
 
 def freed_curve(equations: Problem, row: int, start: Point, t: float) -> tuple[Curve, State]:
@@ -219,16 +212,19 @@ def freed_curve(equations: Problem, row: int, start: Point, t: float) -> tuple[C
         Phi, Phi_q = equations.code.position(q, t, p)
         return Phi - value * unit, Phi_q
 
-    code = replace(
-        equations.code, position=position, nu=lambda q, value, p: unit, lanes=None, stages=()
-    )
-    freed = replace(equations, code=code, engine=Dense(code, equations.p))
+    freed = _with_position(equations, position, nu=lambda q, value, p: unit)
     value = float(start.Phi[row])
     point = replace(start, t=value, Phi=start.Phi - value * unit, factors=None)
     nothing = np.zeros(start.q.size)
     state = State(value, point, nothing, nothing, np.ones(1))
     duration = max(abs(value), float(equations.magnitude[row]))
     return Curve(freed, state, duration), state
+
+
+def _with_position(equations: Problem, position: Any, **functions: Any) -> Problem:
+    """Return equations with other functions than those of their module."""
+    code = replace(equations.code, position=position, lanes=None, blocks=(), **functions)
+    return replace(equations, code=code, engine=Dense(code, equations.p))
 
 
 def _extremes(curve: Curve, state: State, direction: float) -> tuple[list[float], bool]:
@@ -240,7 +236,7 @@ def _extremes(curve: Curve, state: State, direction: float) -> tuple[list[float]
         if bracket is None:
             return [item.t for item in found], False
         if bracket.turns and (turn := curve.singular_point(bracket)) is not None:
-            away = (distance_modulo_turns(curve.equations, turn[0].q, other.q) for other in found)
+            away = (curve.equations.distance(turn[0].q, other.q) for other in found)
             if any(distance <= math.sqrt(SAME_POSITION) for distance in away):
                 return [item.t for item in found], True
             found.append(turn[0])

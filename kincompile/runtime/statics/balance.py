@@ -13,27 +13,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import RANK, RESIDUAL_FACTOR, TOLERANCE
+from kincompile.criteria import RANK, TINY, ZERO
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
+from kincompile.runtime.corrector import nearest
 from kincompile.runtime.problem import problem
+from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from kincompile.runtime.engine.code import Array
-    from kincompile.runtime.engine.engine import Point
+    from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.problem import Problem
 
 STEP = 1e-30
 """Of a complex step; its square is lost in every number."""
-
-CORRECTIONS = 60
-"""Corrections of a position until the joints hold."""
-
-NOTHING = 1e-9
-"""Part of the forces that act up to which a force, or a stiffness, is nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,32 +68,19 @@ class Balance:
 
     def hold(self, q: Array, t: float) -> Place | None:
         """Return the position near one at which the joints hold; None where none is found."""
-        scale, weights = self.scale, self.equations.weights()
-        is_small = False
-        for _ in range(CORRECTIONS):
-            point = self.equations.at(q, t)
-            if point is None or not np.isfinite(point.Phi_q).all():
-                return None
-            left, values, right = np.linalg.svd(weights[:, np.newaxis] * point.Phi_q * scale)
-            rank = int((values > RANK * values[:1]).sum())
-            part = left[:, :rank].T @ (weights * point.Phi) / values[:rank]
-            change = -scale * (part @ right[:rank])
-            size = float(np.abs(change / scale).max(initial=0.0))
-            if is_small:
-                break
-            is_small = self.equations.is_small(change, q, TOLERANCE)
-            q = q + change * min(1.0, 1.0 / (size or 1.0))
-        else:
+        attempt = nearest(self.equations, t, q)
+        if attempt.status is not Status.CONVERGED or not np.isfinite(attempt.last.Phi_q).all():
             return None
-        if not self.equations.holds(point, RESIDUAL_FACTOR * TOLERANCE):
-            return None
+        point, scale, weights = attempt.last, self.scale, self.equations.weights()
+        left, values, right = np.linalg.svd(self.equations.scaled(point.Phi_q))
+        rank, q = int((values > RANK * values[:1]).sum()), point.q
         Q = self.loads(q, t)
         free = (right[rank:] * scale).T
         factors = weights * (left[:, :rank] @ ((right[:rank] @ (scale * Q)) / values[:rank]))
         acting = np.abs(Q) + np.abs(point.Phi_q.T) @ np.abs(factors)
         held = np.abs(self.slopes(q, t)) @ scale
         level = float((np.maximum(acting, held) * scale).max(initial=0.0))
-        return Place(point, free, factors, free.T @ Q, NOTHING * level)
+        return Place(point, free, factors, free.T @ Q, ZERO * level)
 
     def loads(self, q: Array, t: complex) -> Array:
         """Return Q of the mechanism at rest."""
@@ -145,7 +128,7 @@ class Balance:
         is_drift = np.abs(s) ** 2 * values.min(initial=np.inf) <= place.nothing
         if np.abs(np.linalg.eigvals(stiffness)).min(initial=np.inf) > place.nothing:
             is_drift[:] = False
-        return float(s.real[~is_drift].max(initial=0.0) / np.abs(s).max(initial=1e-300))
+        return float(s.real[~is_drift].max(initial=0.0) / np.abs(s).max(initial=TINY))
 
     def in_time(self, q: Array, factors: Array, t: float) -> tuple[Array, Array]:
         r"""Return how :math:`\Phi_q^T \lambda - Q` and Phi change in time where nothing moves."""

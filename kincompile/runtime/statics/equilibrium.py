@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
+from kincompile.criteria import MAX_ITERATIONS, SLIGHT, TOLERANCE, ZERO
 from kincompile.errors import InputError, SolveError, StructuralError
 from kincompile.html import Shown
 from kincompile.names import listed
@@ -24,6 +24,7 @@ from kincompile.runtime.verdict import about
 from kincompile.tables import counted, indented, table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from types import ModuleType
 
     from numpy.typing import ArrayLike
@@ -34,18 +35,15 @@ if TYPE_CHECKING:
     from kincompile.runtime.singular.events import Event
     from kincompile.runtime.statics.settle import Rest
 
-STARTS = 60
-"""Starts from which other equilibria are looked for."""
+STARTS, STARTS_A_FREEDOM = 60, 20
+"""Starts from which other equilibria are looked for: at least, and for each degree of freedom."""
+
+SEARCH_STEPS = 60
+"""Steps after which a search climbs no further: a spring may be stretched for ever."""
 
 STABLE, NEUTRAL, UNSTABLE = "stable", "neutral", "unstable"
 FLUTTER, UNDECIDED = "flutter", "undecided"
 """Kinds of equilibrium."""
-
-GROWTH = 1e-6
-"""Rate at which swings grow, as a part of the fastest rate, up to which they do not."""
-
-INDEPENDENT = 1e-9
-"""Part of a movement up to which there is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -177,7 +175,7 @@ class Equilibrium(Shown):
                 return np.asarray(1 / found[:, 0, 0])
         known = np.isfinite(found).all(axis=(1, 2))
         values = np.linalg.svd(found[known], compute_uv=False)
-        if (values[:, -1] <= INDEPENDENT * values[:, 0]).any():
+        if (values[:, -1] <= ZERO * values[:, 0]).any():
             raise InputError(
                 f"{listed(names)} cannot move independently of each other, so that the matrix of "
                 "their stiffness is infinite: take .compliance, or fewer of them."
@@ -192,7 +190,7 @@ class Equilibrium(Shown):
         loose = values <= rest.place.nothing
         held = right[~loose].T @ ((left[:, ~loose].T @ free.T) / values[~loose, np.newaxis])
         moved = free @ held
-        is_loose = np.abs(free @ left[:, loose]).max(axis=1, initial=0.0) > INDEPENDENT
+        is_loose = np.abs(free @ left[:, loose]).max(axis=1, initial=0.0) > ZERO
         moved[np.ix_(is_loose, is_loose)] = np.inf
         return np.asarray(moved)
 
@@ -269,7 +267,7 @@ def equilibrium(
     inputs = _inputs(module, t, p, guess, through)
     with np.errstate(all="ignore"):
         balance = Balance(inputs)
-        first = settle(balance, inputs.guess, float(inputs.t[0]), downhill=settling)
+        first = settle(balance, inputs.guess, float(inputs.t[0]), climbing=0 if settling else None)
         found: list[Rest] = [] if first is None else [first]
         events: list[Event] = []
         if first is not None and first.is_balanced:
@@ -311,19 +309,35 @@ def equilibria(module: ModuleType, t: float = 0.0, p: Values = None) -> list[Equ
     found: list[Rest] = []
     with np.errstate(all="ignore"):
         balance = Balance(inputs)
-        for start in spread_starts(balance.equations, inputs.guess)[:STARTS]:
-            for downhill in (True, False):
-                rest = settle(balance, start, time, downhill=downhill)
+        for number, start in enumerate(spread_starts(balance.equations, inputs.guess)):
+            freedoms = len(found[0].stiffness) if found else 0
+            if number >= max(STARTS, STARTS_A_FREEDOM * freedoms):
+                break
+            for rest in _rests_from(balance, start, time):
                 known = (other.place.q for other in found)
-                if rest is None or not rest.is_balanced:
-                    continue
-                if is_new(balance.equations, rest.place.q, known):
+                if rest.is_balanced and is_new(balance.equations, rest.place.q, known):
                     _require_loads(balance, rest)
                     found.append(rest)
         results = [_equilibrium(inputs, balance, [rest], []) for rest in found]
     scale = balance.scale
     away = [float(np.linalg.norm((item.q[0] - inputs.guess) / scale)) for item in results]
     return [results[k] for k in np.argsort(np.round(away, 6), kind="stable")]
+
+
+def _rests_from(balance: Balance, start: Array, t: float) -> Iterator[Rest]:
+    """Yield where a mechanism goes from a start: downhill, by Newton's method, and climbing.
+
+    Newton's method seldom ends where much is unstable: climbing goes there from as far away as
+    downhill goes to what is stable.
+    """
+    lowest = settle(balance, start, t)
+    if lowest is None:
+        return
+    yield lowest
+    for climbing in (None, *range(1, len(lowest.stiffness) + 1)):
+        rest = settle(balance, start, t, climbing=climbing, steps=SEARCH_STEPS)
+        if rest is not None:
+            yield rest
 
 
 def _inputs(
@@ -351,7 +365,7 @@ def _require_loads(balance: Balance, rest: Rest) -> None:
     owners = balance.code.owners()
     names = [owners[name] for name in balance.code.coordinates]
     loaded = {name for name, work in zip(names, balance.acting(place), strict=True) if work > 0}
-    idle = [name for name, way in zip(names, loose, strict=True) if way > INDEPENDENT]
+    idle = [name for name, way in zip(names, loose, strict=True) if way > ZERO]
     if free := [name for name in dict.fromkeys(idle) if name not in loaded]:
         raise StructuralError(
             f"{balance.code.name}: nothing acts on {listed(free)}, free to move, so that no "
@@ -397,7 +411,7 @@ def _kind(balance: Balance, rest: Rest) -> str:
     growth = balance.growth(rest.place, rest.stiffness)
     if growth is None and np.abs(skew).max(initial=0.0) > rest.place.nothing:
         return UNDECIDED
-    if growth is not None and growth > GROWTH:
+    if growth is not None and growth > SLIGHT:
         return FLUTTER
     return NEUTRAL if 0 in signs else STABLE
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from kincompile.criteria import SLIGHT
 from kincompile.errors import InputError
 from kincompile.html import Shown
 from kincompile.names import listed, suggestion
@@ -15,9 +16,6 @@ from kincompile.runtime.results.forces import Forces
 
 if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array
-
-EVEN = 1e-6
-"""Part of its size by which the speed of a driver may vary and be constant."""
 
 CLOSED = 1e-3
 """Part of the largest power by which that at the end may differ from that at the start."""
@@ -96,7 +94,7 @@ def flywheel(found: Forces, driver: str, fluctuation: float) -> Flywheel:
     drive, t = _checked(found, driver, fluctuation), found.motion.t
     torque, power = drive
     speed = float(power @ torque / (torque @ torque))
-    if not np.abs(power - speed * torque).max() <= EVEN * np.abs(power).max():
+    if not np.abs(power - speed * torque).max() <= SLIGHT * np.abs(power).max():
         raise InputError(
             f"the driver {driver!r} does not run at a constant speed, for which a flywheel is "
             "sized: give it a driver such as w*kc.t."

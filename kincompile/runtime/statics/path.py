@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import ZERO
 from kincompile.names import listed
+from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.march import State
-from kincompile.runtime.problem import Dense
 from kincompile.runtime.singular.curve import Curve
 from kincompile.runtime.singular.events import Event, involved
-from kincompile.runtime.statics.balance import NOTHING
 from kincompile.runtime.statics.settle import settle
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class _Way:
         step = latest - t
         while t != latest:
             ahead = latest if abs(latest - t) <= abs(step) else t + step
-            following = settle(self.balance, rest.place.q, ahead, downhill=False)
+            following = settle(self.balance, rest.place.q, ahead, climbing=None)
             if following is not None and self._continues(rest, following):
                 rest, t, step = following, ahead, 2 * step
                 continue
@@ -119,7 +119,7 @@ class _Way:
                 return None
             t = event.t + ahead * SHORTEST * self.span
         t = min(t, latest, key=lambda time: time * ahead)
-        return settle(self.balance, q, t, downhill=self.snaps)
+        return settle(self.balance, q, t, climbing=0 if self.snaps else None)
 
 
 class Path:
@@ -127,12 +127,11 @@ class Path:
 
     def __init__(self, balance: Balance, place: Place, duration: float) -> None:
         self.balance, self._duration = balance, duration
-        held = balance.equations.weights()[:, np.newaxis] * place.point.Phi_q * balance.scale
-        left = np.linalg.svd(held)[0]
+        left = np.linalg.svd(balance.equations.scaled(place.point.Phi_q))[0]
         rank = place.q.size - place.free.shape[1]
         # Redundant joints share their load in any way: one way of it is followed.
         self._rows = left[:, :rank].T * balance.equations.weights()
-        self._size = place.nothing / NOTHING or 1.0
+        self._size = place.nothing / ZERO or 1.0
         self.system = self._system()
 
     def unknowns(self, place: Place) -> Array:
@@ -175,7 +174,7 @@ class Path:
             position=self._position,
             nu=self._in_time,
             lanes=None,
-            stages=(),
+            blocks=(),
             redundant=(),
             pattern=np.argwhere(np.ones((equations.place.size + added.size,) * 2)),
         )

@@ -1,4 +1,4 @@
-"""From a guess to an equilibrium: downhill to a stable one, or straight to the nearest."""
+"""From a guess to an equilibrium: downhill to a stable one, up to others, or to the nearest."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from kincompile.criteria import ZERO
 
 if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array
@@ -19,9 +21,6 @@ REACH = 0.3
 
 SHORTEST = 1e-10
 """Part of a step that is tried last."""
-
-AT_REST = 1e-9
-"""Step, in scales, after which the next one is a rounding error."""
 
 OVERSHOT = 0.5
 """Part of the force before a step that may push back after it."""
@@ -48,46 +47,58 @@ class Rest:
         return tuple(int(x > least) - int(x < -least) for x in self.eigenvalues)
 
 
-def settle(balance: Balance, guess: Array, t: float, *, downhill: bool = True) -> Rest | None:
+def settle(
+    balance: Balance, guess: Array, t: float, *, climbing: int | None = 0, steps: int = MOST_STEPS
+) -> Rest | None:
     """Return where a mechanism goes from a guess; None where its joints cannot be assembled.
 
-    Downhill it is moved along its forces, as it would go if it were damped heavily, so that what is
-    found is not unstable. Else Newton's method goes to a near one of any kind.
+    It is moved along its forces, as it would go if it were damped heavily, so that what is found is
+    not unstable. The `climbing` softest of its movements go against the forces instead, to an
+    equilibrium with as many that are unstable. With None, Newton's method goes to a near one of any
+    kind.
     """
     place = balance.hold(guess, t)
     if place is None:
         return None
-    for step in range(MOST_STEPS):
+    for step in range(steps):
         stiffness = balance.stiffness(place)
         if not np.isfinite(stiffness).all():
             return Rest(place, stiffness, False, step)
-        move = _move(place, stiffness) if downhill else _newton_move(place, stiffness)
+        move, down = _move(place, stiffness, climbing)
         size = float(np.linalg.norm(move))
-        following = _moved(balance, place, move * min(1.0, REACH / (size or 1.0)), downhill)
+        part = min(1.0, REACH / (size or 1.0))
+        following = _moved(balance, place, part * move, part * down)
         if following is None:
             return Rest(place, stiffness, False, step)
         place = following
-        if size <= AT_REST:
+        if size <= ZERO:
             return Rest(place, balance.stiffness(place), place.is_balanced, step)
-    return Rest(place, stiffness, False, MOST_STEPS)
+    return Rest(place, stiffness, False, steps)
 
 
-def _move(place: Place, stiffness: Array) -> Array:
-    """Return the step downhill: Newton's, with the size of stiffnesses that are negative.
+def _move(place: Place, stiffness: Array, climbing: int | None) -> tuple[Array, Array]:
+    """Return the step, and the same one with the movements that climb turned down.
 
+    It is Newton's, with the stiffnesses of what climbs taken as negative, the others as positive.
     At rest at the top of a hill it goes down on one side.
     """
+    if climbing is None:
+        move = _newton_move(place, stiffness)
+        return move, 0 * move
     values, ways = np.linalg.eigh((stiffness + stiffness.T) / 2)
-    if (values > place.nothing).all():
-        return np.asarray(np.linalg.solve(stiffness, place.force))
+    signs = np.where(np.arange(values.size) < climbing, -1.0, 1.0)
     force = ways.T @ place.force
     force[np.abs(force) <= place.nothing] = 0.0
-    falls = np.linalg.eigvals(stiffness).real < -place.nothing
-    if not force.any() and falls.any():
-        return np.asarray(REACH * ways[:, 0])
-    sizes = np.maximum(np.abs(values), place.nothing or 1.0)
-    # What nothing holds back goes on for ever, and keeps nothing else from coming to rest.
-    return np.asarray(ways @ np.clip(force / sizes, -REACH, REACH))
+    held = signs * np.sort(np.linalg.eigvals(stiffness).real)
+    if (signs * values > place.nothing).all():
+        steps = ways.T @ np.linalg.solve(stiffness, place.force)
+    elif not force.any() and (held < -place.nothing).any():
+        steps = REACH * np.eye(values.size)[np.argmin(held)]
+    else:
+        sizes = np.maximum(np.abs(values), place.nothing or 1.0)
+        # What nothing holds back goes on for ever, and keeps nothing else from coming to rest.
+        steps = signs * np.clip(force / sizes, -REACH, REACH)
+    return ways @ steps, ways @ (signs * steps)
 
 
 def _newton_move(place: Place, stiffness: Array) -> Array:
@@ -97,18 +108,18 @@ def _newton_move(place: Place, stiffness: Array) -> Array:
     return np.asarray(right[known].T @ ((left[:, known].T @ place.force) / values[known]))
 
 
-def _moved(balance: Balance, place: Place, move: Array, downhill: bool) -> Place | None:
+def _moved(balance: Balance, place: Place, move: Array, down: Array) -> Place | None:
     """Return the position after as much of a step as does not overshoot; None where there is none.
 
-    Beyond the bottom the forces push back.
+    Beyond the bottom the forces push back along `down`, which is zero where any step is good.
     """
-    part, push = 1.0, float(place.force @ move)
+    part, push = 1.0, float(place.force @ down)
     while part >= SHORTEST:
         following = balance.hold(place.q + part * (place.free @ move), place.point.t)
         if following is not None:
-            way = following.free.T @ ((following.q - place.q) / balance.scale**2) / part
+            way = following.free.T @ (place.free @ down / balance.scale**2)
             back = float(following.force @ way)
-            if not downhill or back >= -OVERSHOT * push or abs(back) <= following.nothing:
+            if back >= -OVERSHOT * push or abs(back) <= following.nothing:
                 return following
         part /= 2
     return None

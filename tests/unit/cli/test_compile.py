@@ -6,7 +6,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.cli.compile import ENDINGS
-from kincompile.targets.registry import TARGETS
+from kincompile.emitters.registry import TARGETS
 
 
 def test_that_the_module_written_is_the_one_that_emit_gives(kincompile, pendulum, tmp_path):

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from kincompile.cli import derive
-from kincompile.derivation.derivation import FORMATS
-from kincompile.derivation.document import LEVELS
+from kincompile.derivations.derivation import FORMATS
+from kincompile.derivations.document import LEVELS
 
 
 @pytest.mark.parametrize("ending", FORMATS)

@@ -179,6 +179,11 @@ targets = [
         ),
         (
             "fit",
+            "[fit]\nparameters = { r = [1, 2] }\ntargets = [{ limit = '30*deg', most = 1 }]",
+            "expected a column or a formula of parameters, not a number",
+        ),
+        (
+            "fit",
             "[fit]\nparameters = { r = [1, 2] }\ntargets = [{ path = 'ram', points = 3 }]",
             "expected a list of lists of numbers",
         ),

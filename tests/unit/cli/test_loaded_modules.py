@@ -15,11 +15,14 @@ kincompile.cli.cli(sys.argv[1:], standalone_mode=False)
 print("\\nLOADED", *sys.modules)
 """
 
-PAGES = "kincompile.view kincompile.derivation kincompile.compare kincompile.verify"
-LARGE = "kincompile.ir.grouping kincompile.targets.numpy.grouped kincompile.structure.stages"
+PAGES = "kincompile.view kincompile.derivations kincompile.checker kincompile.verification"
+LARGE = "kincompile.ir.grouping kincompile.emitters.numpy.grouped"
 EXTRA = "rich platformdirs matplotlib scipy kincompile.runtime.native"
-LANGUAGES = "kincompile.targets.c kincompile.targets.octave kincompile.targets.javascript"
-EMITTING = "kincompile.compiler kincompile.ir kincompile.targets jinja2"
+LANGUAGES = (
+    "kincompile.emitters.c kincompile.emitters.octave kincompile.emitters.javascript "
+    "kincompile.emitters.rust kincompile.solver"
+)
+EMITTING = "kincompile.compiler kincompile.ir kincompile.emitters jinja2"
 RANK = "kincompile.ir.redundancy kincompile.structure.rank kincompile.structure.report"
 
 TASKS = """
@@ -39,45 +42,46 @@ SPACE = (
 
 NOT_LOADED = {
     "assemblies MODEL": (
-        f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivation kincompile.compare kincompile.verify"
+        f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivations kincompile.checker "
+        "kincompile.verification"
     ),
     "compile MODEL -o -": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} kincompile.runtime scipy",
     "compile MODEL -o - --target javascript": (
-        f"{PAGES} {LARGE} {EXTRA} {RANK} kincompile.runtime kincompile.targets.numpy "
-        "kincompile.targets.c kincompile.targets.octave"
+        f"{PAGES} {LARGE} {EXTRA} {RANK} kincompile.runtime kincompile.emitters.numpy "
+        "kincompile.emitters.c kincompile.emitters.octave"
     ),
     "run MODEL": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} scipy.sparse.csgraph",
     "simulate HEAVY": (
-        "kincompile.derivation kincompile.compare kincompile.verify kincompile.view rich "
+        "kincompile.derivations kincompile.checker kincompile.verification kincompile.view rich "
         f"platformdirs matplotlib sksundae {LANGUAGES}"
     ),
-    "inspect MODEL": f"{PAGES} {EXTRA} {LANGUAGES} kincompile.targets.numpy kincompile.runtime",
+    "inspect MODEL": f"{PAGES} {EXTRA} {LANGUAGES} kincompile.emitters.numpy kincompile.runtime",
     "derive MODEL -o PAGE.html": (
-        f"{EXTRA} {LARGE} kincompile.view.page kincompile.view.mechanism_plot kincompile.compare "
-        "kincompile.verify"
+        f"{EXTRA} {LARGE} kincompile.view.page kincompile.view.mechanism_plot kincompile.checker "
+        "kincompile.verification"
     ),
     "draw MODEL -o DRAWING.svg": (
-        f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivation kincompile.compare kincompile.verify "
-        f"kincompile.view.page ezdxf watchfiles {SPACE}"
+        f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivations kincompile.checker "
+        f"kincompile.verification kincompile.view.page ezdxf watchfiles {SPACE}"
     ),
     "view MODEL -o PAGE.html": (
-        f"{EXTRA} {LARGE} {SPACE} kincompile.derivation kincompile.compare"
+        f"{EXTRA} {LARGE} {SPACE} kincompile.derivations kincompile.checker"
     ),
-    "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivation",
+    "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivations",
     "equilibrium HEAVY": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} scipy.interpolate",
-    "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verify",
-    "mark KIT": "rich platformdirs matplotlib kincompile.view.page kincompile.verify",
+    "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verification",
+    "mark KIT": "rich platformdirs matplotlib kincompile.view.page kincompile.verification",
     "sweep MODEL --sweep length=1:2:2 --target numpy --processes 1": (
         f"{LARGE} {LANGUAGES} {RANK} rich platformdirs matplotlib zarr pyarrow xarray scipy.stats "
-        "kincompile.view.page kincompile.compare kincompile.verify"
+        "kincompile.view.page kincompile.checker kincompile.verification"
     ),
     "tolerance TASK": (
-        f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.targets.c kincompile.verify "
-        "kincompile.compare"
+        f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.emitters.c "
+        "kincompile.verification kincompile.checker"
     ),
     "fit TASK": (
-        f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.targets.c kincompile.verify "
-        "kincompile.compare"
+        f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.emitters.c "
+        "kincompile.verification kincompile.checker"
     ),
     "schema": f"{PAGES} {EXTRA} {EMITTING} kincompile.runtime",
 }

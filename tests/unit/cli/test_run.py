@@ -103,7 +103,7 @@ def test_that_a_run_without_any_position_has_a_summary(kincompile, tmp_path):
     )
     done = kincompile("run", tmp_path / "model.py", "-o", tmp_path / "out.json")
     assert done.exit_code == 3
-    assert "1 NOT_CONVERGED, 100 NOT_REACHED" in done.stderr
+    assert "100 NOT_REACHED, 1 NOT_ASSEMBLED" in done.stderr
     assert json.loads((tmp_path / "out.json").read_text())["q"] == [[None]] * 101
 
 

@@ -10,7 +10,7 @@ import xarray
 
 import kincompile as kc
 from kincompile.files.sweep_table import SweepTable, read_sweep_table
-from kincompile.sweep.samples import values_of
+from kincompile.sweeps.samples import values_of
 from tests.unit.sweep.models import TIMES, crank, folding
 
 TABLE = """
@@ -59,6 +59,7 @@ def test_a_table_gives_a_folder_a_summary_and_a_page(kincompile, model, tmp_path
     assert "y_tip_greatest [m] over parameters" in html
 
 
+@pytest.mark.filterwarnings("default::kincompile.errors.DamagedStoreWarning")
 def test_a_second_run_goes_on(kincompile, model, tmp_path):
     store = tmp_path / "a.parquet"
     options = ("-o", store, "--chunk", 1)
@@ -66,6 +67,7 @@ def test_a_second_run_goes_on(kincompile, model, tmp_path):
     assert first.exit_code == 0, first.stderr
     (store / "part-3.parquet").unlink()
     again = sweep(kincompile, model(), *options)
+    assert "a.parquet: chunk 3 is damaged; it is solved again." in again.stderr
     assert again.stdout == first.stdout
     other = sweep(kincompile, model(), *options, "--set", "omega=2")
     assert other.exit_code == 2
@@ -104,11 +106,13 @@ def test_what_cannot_be_assembled_is_counted_and_alone_is_exit_code_3(
     page = tmp_path / "a.html"
     done = sweep(kincompile, model(table, folding()), "--page", page)
     assert done.exit_code == code
-    assert "NOT_CONVERGED" in done.stdout
+    assert "NOT_ASSEMBLED" in done.stdout
     assert ("no set of parameters was solved" in done.stderr) == bool(code)
+    assert "NOT_ASSEMBLED: At the first time no position was found" in done.stderr
     assert "the mechanism cannot be assembled there" in page.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_workers_end_with_a_run_that_is_killed(model, tmp_path, start_process):
     store = tmp_path / "a.parquet"
     table = "[sweep]\nparameters = { a = { from = 1, to = 2, count = 100000 } }\n"
@@ -165,7 +169,7 @@ def test_a_file_without_a_table_says_nothing(model, tmp_path):
         ("parameters = { a = { from = 1, to = 2, count = 10000000 }, omega = { from = 1, to = 2, "
          "count = 10 } }", "10,000,010 values are more than the 10,000,000 of a file"),
         ("parameters = { b = [1] }", "there is no parameter 'b'"),
-        ("parameters = { a = [] }", "give real numbers"),
+        ("parameters = { a = [] }", "a list of at least 1, not a list of 0"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_in_a_table_is_said_with_its_place(kincompile, model, table, message):

@@ -7,8 +7,8 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.compare.reference import Reference
-from kincompile.compare.report import Report
+from kincompile.checker.reference import Reference
+from kincompile.checker.report import Report
 
 
 def two_bodies() -> kc.Mechanism:

@@ -9,13 +9,13 @@ import sympy
 import kincompile as kc
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import Components, Vector, VectorSymbol
-from kincompile.compare.compare import compare
-from kincompile.compare.comparison import Verdict
-from kincompile.compare.fault import Kind
-from kincompile.compare.joint_faults import JointFaults
-from kincompile.compare.reference import Reference
-from kincompile.compare.report import Report
-from kincompile.compare.vectors import Exchanged
+from kincompile.checker.compare import compare
+from kincompile.checker.comparison import Verdict
+from kincompile.checker.fault import Kind
+from kincompile.checker.joint_faults import JointFaults
+from kincompile.checker.reference import Reference
+from kincompile.checker.report import Report
+from kincompile.checker.vectors import Exchanged
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import partials
 from kincompile.model.resolve import Joint

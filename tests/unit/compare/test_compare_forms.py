@@ -8,7 +8,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.compare.report import Report
+from kincompile.checker.report import Report
 
 t = kc.t
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")

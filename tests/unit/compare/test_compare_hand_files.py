@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 from pathlib import Path
 
 import click.testing
@@ -10,9 +11,10 @@ import rich.console
 import sympy
 
 import kincompile as kc
+from kincompile.checker.hand_file import read_hand_file
 from kincompile.cli import cli
-from kincompile.compare.hand_file import read_hand_file
 from kincompile.errors import InputError
+from tests.pendulum import pendulum
 
 ROOT = Path(__file__).resolve().parents[3]
 DATA = ROOT / "tests" / "data"
@@ -200,3 +202,16 @@ def test_that_a_page_shows_what_was_written_and_does_not_obey_it() -> None:
     report = kc.compare(system, gamma="[Piecewise((1, x<1), (2, True))]")
     assert "x&lt;1" in report.to_html()
     assert "x<1" not in report.to_html()
+
+
+@pytest.mark.parametrize("text", ["{} = 1", "{}", "a{} = 3", "x = 1{}", "nu = [0, 0, 2*t] % {}"])
+def test_that_no_control_character_of_a_file_is_passed_on(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "hand.txt"
+    path.write_text(text.format("\x1b]0;pwned\x07\x1b[2J\x9b2J\x00"), encoding="utf-8")
+    try:
+        report = kc.compare_file(pendulum(), path)
+        texts = [report.to_text(), report.to_html(), report.to_gradescope()]
+    except kc.KincompileError as error:
+        texts = [str(error)]
+    for found in texts:
+        assert not re.findall(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]", found)

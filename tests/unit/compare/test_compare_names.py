@@ -6,7 +6,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.compare.notation import plain
+from kincompile.checker.notation import plain
 from kincompile.errors import InputError
 from tests.pendulum import pendulum
 

@@ -7,7 +7,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.compare.report import Report
+from kincompile.checker.report import Report
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 Models = dict[str, Callable[[], kc.Mechanism]]

@@ -9,8 +9,8 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.compare.reference import Reference
-from kincompile.compare.report import Report
+from kincompile.checker.reference import Reference
+from kincompile.checker.report import Report
 from tests.pendulum import pendulum
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")

@@ -10,8 +10,8 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.compare.comparison import Verdict
-from kincompile.compare.report import Report
+from kincompile.checker.comparison import Verdict
+from kincompile.checker.report import Report
 
 Pair = tuple[str, str]
 

@@ -1,8 +1,8 @@
-"""Every constraint type beside an oracle that knows its Phi alone, written by hand.
+"""Every constraint type beside an oracle that knows its Phi alone, written by hand (`by_hand`).
 
-The oracle works in the complex plane (r = x + iy, A s = s e^(i phi), R = i) with 40 digits: it
-shares neither code nor notation with the compiler. Its derivatives are differences: Phi_q central,
-nu = -dPhi/dt, and gamma = -d^2/ds^2 Phi(q + s q_dot, t + s), exact because q_ddot = 0 on that line.
+The oracle shares neither code nor notation with the compiler. Its derivatives are differences:
+Phi_q central, nu = -dPhi/dt, and gamma = -d^2/ds^2 Phi(q + s q_dot, t + s), exact because
+q_ddot = 0 on that line.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy
-from mpmath.ctx_mp import MPContext
 from numpy.typing import NDArray
 
 import kincompile as kc
@@ -23,12 +22,11 @@ from kincompile.ir.lower import lower
 from kincompile.model.spline import SplineTable, fit
 from kincompile.runtime.load import from_source
 from kincompile.structure.counting import unmatched
+from tests.by_hand import BY_HAND, mp
 
 Array = NDArray[np.float64]
 Quantities = tuple[Array, Array, Array, Array]
 
-mp = MPContext()
-mp.dps = 40
 STEP = mp.mpf(10) ** -12
 
 T0 = 0.4  # the time of every state; the flat driver has C' = 0 there
@@ -92,7 +90,7 @@ def exact_spline(values: Any, alpha: Any) -> tuple[Any, Any]:
     return rho, slant
 
 
-# ---- the constraints as a user writes them, and by hand in the complex plane ---------------------
+# ---- the constraints as a user writes them -------------------------------------------------------
 
 BUILD: dict[str, Callable[[Any], Any]] = {
     "AbsoluteX": lambda a: kc.AbsoluteX("k", a.i, a.s_i, a.C),
@@ -130,70 +128,6 @@ WITH_VALUE = (
 PROFILES = {
     "CamFollower": ("rho_i", "rho_j"), "CamFlatFollower": ("rho_i",), "PointFollower": ("rho_j",),
 }  # fmt: skip
-
-
-def inner(u: Any, v: Any) -> Any:
-    """Return u^T v of two vectors in the complex plane."""
-    return u.real * v.real + u.imag * v.imag
-
-
-def gap(w: Any) -> Any:
-    """Return d, from the point on body i to that on body j."""
-    return w.r_j + w.A_j * w.s_j - w.r_i - w.A_i * w.s_i
-
-
-def gear(w: Any) -> list[Any]:
-    rolled = w.R_i * (w.phi_i + w.theta_i) + w.R_j * (w.phi_j + w.theta_j) - w.R_j * mp.pi
-    return [inner(gap(w), 1j * mp.expj(rolled / (w.R_i + w.R_j)))]
-
-
-def rack(w: Any) -> list[Any]:
-    v = w.A_i * (w.s_Q - w.s_P)
-    angle = w.phi_i + w.theta_i - w.phi_j - w.theta_j + 3 * mp.pi / 2
-    from_q = w.r_j + w.A_j * w.s_j - w.r_i - w.A_i * w.s_Q
-    from_p = w.r_j + w.A_j * w.s_j - w.r_i - w.A_i * w.s_P
-    return [
-        inner(from_q, v) - abs(v) * w.R_j * angle,
-        inner(from_p, 1j * v) - abs(v) * w.R_j,
-    ]
-
-
-def pair(vector: Any) -> list[Any]:
-    return [vector.real, vector.imag]
-
-
-BY_HAND: dict[str, Callable[[Any], list[Any]]] = {
-    "AbsoluteX": lambda w: [(w.r_i + w.A_i * w.s_i).real - w.C],
-    "AbsoluteY": lambda w: [(w.r_i + w.A_i * w.s_i).imag - w.C],
-    "AbsoluteAngle": lambda w: [w.phi_i - w.C],
-    "AbsoluteDistance": lambda w: [abs(w.r_i + w.A_i * w.s_i - w.c) ** 2 - w.C**2],
-    "RelativeX": lambda w: [gap(w).real - w.C],
-    "RelativeY": lambda w: [gap(w).imag - w.C],
-    "RelativeAngle": lambda w: [w.phi_j - w.phi_i - w.C],
-    "Distance": lambda w: [abs(gap(w)) ** 2 - w.C**2],
-    "Revolute": lambda w: pair(-gap(w)),
-    "Translational": lambda w: [
-        inner(1j * w.A_i * w.v_i, gap(w)),
-        inner(1j * w.A_i * w.v_i, w.A_j * w.v_j),
-    ],
-    "RevoluteTranslational": lambda w: [inner(1j * w.A_i * w.v_i, gap(w)) / abs(w.v_i) - w.C],
-    "TranslationalDistance": lambda w: [inner(w.A_i * w.v_i, gap(w)) / abs(w.v_i) - w.C],
-    "Gear": gear,
-    "RackAndPinion": rack,
-    "CamFollower": lambda w: [
-        *pair(w.r_i + w.A_i * (w.s_i + w.a_i) - w.r_j - w.A_j * (w.s_j + w.a_j)),
-        inner(1j * w.A_i * w.g_i, w.A_j * w.g_j),
-    ],
-    "CamFlatFollower": lambda w: [
-        inner(1j * w.A_j * w.v_j, w.r_j + w.A_j * w.s_j - w.r_i - w.A_i * (w.s_i + w.a_i)),
-        inner(1j * w.A_j * w.v_j, w.A_i * w.g_i),
-    ],
-    "PointFollower": lambda w: pair(w.r_i + w.A_i * w.s_i - w.r_j - w.A_j * (w.s_j + w.a_j)),
-    "Equation": lambda w: [
-        w.r_i.real * mp.sin(w.phi_j) - w.C * w.r_j.imag**2,
-        mp.exp(w.phi_i * w.r_j.real / 4) - w.C,
-    ],
-}
 
 
 # ---- one constraint in a mechanism, and the same by hand -----------------------------------------

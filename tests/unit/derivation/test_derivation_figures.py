@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 
 import kincompile as kc
 from kincompile import spatial
-from kincompile.derivation.document import Figure
-from kincompile.derivation.evaluation import evaluation
-from kincompile.derivation.figures import Figures
-from kincompile.derivation.svg import as_svg
+from kincompile.derivations.document import Figure
+from kincompile.derivations.evaluation import evaluation
+from kincompile.derivations.figures import Figures
+from kincompile.derivations.svg import as_svg
 from kincompile.model.constraint import Constraint
 from kincompile.space.catalogue import CONSTRAINTS
 from kincompile.view.picture import Arrow

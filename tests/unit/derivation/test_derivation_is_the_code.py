@@ -8,10 +8,11 @@ import pytest
 
 import kincompile as kc
 from kincompile.calculus.expressions import Number, Pi, Power, Product, Sum, Symbol
-from kincompile.derivation.document import Display
-from kincompile.derivation.expanded import Writer, minus
-from kincompile.derivation.formulas import Call, Choice, Decimal, Equated, Quotient, Relation
+from kincompile.derivations.document import Display
+from kincompile.derivations.expanded import Writer, minus
+from kincompile.derivations.formulas import Call, Choice, Decimal, Equated, Quotient, Relation
 from kincompile.derive.derivation import derive
+from kincompile.emitters.emission import emit_program
 from kincompile.ir.graph import Graph
 from kincompile.ir.inline import inline
 from kincompile.ir.interpret import BINARY, FUNCTIONS
@@ -19,7 +20,6 @@ from kincompile.ir.lower import lower
 from kincompile.model.resolve import Joint
 from kincompile.names import rate
 from kincompile.runtime.load import from_source
-from kincompile.targets.emission import emit_program
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 

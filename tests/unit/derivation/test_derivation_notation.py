@@ -11,7 +11,7 @@ import kincompile as kc
 from kincompile.calculus.expressions import Number, Product, Sum, Symbol, VectorSymbol
 from kincompile.calculus.rotations import turned
 from kincompile.calculus.symbols import i, j, s_i, s_j, unit
-from kincompile.derivation.formulas import (
+from kincompile.derivations.formulas import (
     Call,
     Choice,
     Decimal,
@@ -21,10 +21,10 @@ from kincompile.derivation.formulas import (
     Matrix,
     Relation,
 )
-from kincompile.derivation.joint_terms import abbreviations
-from kincompile.derivation.mathml import MathMLPrinter
-from kincompile.derivation.notation import split_name
-from kincompile.derivation.tex import TexPrinter, escape
+from kincompile.derivations.joint_terms import abbreviations
+from kincompile.derivations.mathml import MathMLPrinter
+from kincompile.derivations.notation import split_name
+from kincompile.derivations.tex import TexPrinter, escape
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import partials
 

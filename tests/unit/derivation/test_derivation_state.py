@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.derivation.document import CrossReference, Math, Table, Verbatim
-from kincompile.derivation.evaluation import evaluation
-from kincompile.derivation.formulas import Decimal
+from kincompile.derivations.document import CrossReference, Math, Table, Verbatim
+from kincompile.derivations.evaluation import evaluation
+from kincompile.derivations.formulas import Decimal
 from kincompile.errors import InputError
 
 

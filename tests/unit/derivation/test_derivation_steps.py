@@ -7,7 +7,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.calculus.expressions import ONE, VectorSymbol
-from kincompile.derivation.document import CrossReference, Display, Table
+from kincompile.derivations.document import CrossReference, Display, Table
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import coefficient, partials
 from kincompile.derive.rules import Rule, along

@@ -10,9 +10,9 @@ import pytest
 import kincompile as kc
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import Number, Product, Symbol
-from kincompile.derivation.formulas import size
-from kincompile.derivation.joint_terms import abbreviations
-from kincompile.derivation.tex import TexPrinter
+from kincompile.derivations.formulas import size
+from kincompile.derivations.joint_terms import abbreviations
+from kincompile.derivations.tex import TexPrinter
 from kincompile.derive import collected as collecting
 from kincompile.derive.collected import collected
 from kincompile.derive.derivation import derive

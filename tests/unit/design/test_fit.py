@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import sympy
+from scipy.optimize import minimize_scalar
 
 import kincompile as kc
 from kincompile.design.demands import read_demands
@@ -15,7 +16,12 @@ from kincompile.design.trial import Workbench
 LENGTHS = ("r1", "r2", "r3", "r4")
 
 
-def fourbar(name="four_bar", end=2 * math.pi, points=73, **values):
+def slow(*values):
+    """Return parameters of the slow run."""
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
+def fourbar(name="four_bar", end=2 * math.pi, points=73, ahead=0.0, **values):
     """Return a four-bar whose crank turns by t, with a point P in the frame of its rod."""
     m = kc.Mechanism(name, end=end, points=points)
     lengths = {"r1": 3.7, "r2": 2.0, "r3": 4.0, "r4": 2.7, "u": 1.7, "v": 1.7, **values}
@@ -26,7 +32,7 @@ def fourbar(name="four_bar", end=2 * math.pi, points=73, **values):
     m.add(kc.Revolute("B", crank, (r2, 0), rod, (0, 0)))
     m.add(kc.Revolute("C", rod, (r3, 0), rocker, (r4, 0)))
     m.add(kc.Revolute("D", rocker, (0, 0), m.ground, (r1, 0)))
-    m.add(kc.AbsoluteAngle("motor", crank, kc.t))
+    m.add(kc.AbsoluteAngle("motor", crank, kc.t + ahead))
     m.point("P", rod, (u, v))
     ends = m.point("before", rod, (0, 0)), m.point("joint", rod, (r3, 0)), (r1, 0)
     m.output("mu", kc.outputs.transmission_angle(*ends), unit="rad")
@@ -114,8 +120,8 @@ def test_path_without_times_finds_them_in_order():
     assert found.parameters == pytest.approx({"u": 2.5, "v": 1.0}, abs=1e-7)
 
 
-def test_time_ratio_of_an_offset_slider_crank_is_reached():
-    # Chebyshev: the rise takes pi + beta of the cycle, beta the angle between both dead centres.
+def press():
+    """Return a slider-crank of crank 1 and rod 3, whose guide has the offset e."""
     m = kc.Mechanism("press", end=2 * math.pi, points=181)
     e = m.parameter("e", 0.1, "m")
     crank, rod = m.body("crank", (0, 0, 0.3)), m.body("rod", (1, 0.3, 0))
@@ -125,33 +131,55 @@ def test_time_ratio_of_an_offset_slider_crank_is_reached():
     m.add(kc.Revolute("C", rod, (3, 0), ram, (0, 0)))
     m.add(kc.Translational("D", m.ground, (0, e), (1, 0), ram, (0, 0), (1, 0)))
     m.add(kc.AbsoluteAngle("motor", crank, kc.t + 0.3))
-    found = kc.fit(m, kc.targets.time_ratio("ram.x", 1.1), bounds={"e": (-1.5, -0.01)}, samples=32)
-    assert found.success
-    offset = found.parameters["e"]
+    return m
+
+
+def ratio_of_press(offset):
+    """Return the time ratio: the rise takes pi + beta, beta between both dead centres."""
     turn = abs(math.asin(offset / 4) - math.asin(offset / 2))
-    assert (math.pi + turn) / (math.pi - turn) == pytest.approx(1.1, abs=1e-7)
+    return (math.pi + turn) / (math.pi - turn)
 
 
-def test_active_limit_holds_and_costs_as_little_as_possible():
+def test_time_ratio_of_an_offset_slider_crank_is_reached():
+    ratio = kc.targets.time_ratio("ram.x", 1.1)
+    found = kc.fit(press(), ratio, bounds={"e": (-1.5, -0.01)}, samples=32)
+    assert found.success
+    assert ratio_of_press(found.parameters["e"]) == pytest.approx(1.1, abs=1e-7)
+
+
+def test_that_each_time_ratio_counts_once():
+    ratios = [kc.targets.time_ratio("ram.x", 1.1), kc.targets.time_ratio("ram.x", 1.3)]
+    x = kc.targets.value("ram.x", [3.8], [0.2])
+    found = kc.fit(press(), [*ratios, x], bounds={"e": (-1.5, -0.01)}, samples=32)
+    assert [item.wanted for item in found.reached] == [3.8, 1.1, 1.3]
+
+    def error(e):
+        place = math.cos(0.5) + math.sqrt(9 - (math.sin(0.5) - e) ** 2)
+        ratio = ratio_of_press(e)
+        return (place - 3.8) ** 2 + (ratio - 1.1) ** 2 + (ratio - 1.3) ** 2
+
+    best = minimize_scalar(error, bounds=(-1.5, -0.01), options={"xatol": 1e-10})
+    assert found.parameters["e"] == pytest.approx(best.x, abs=1e-5)
+    assert found.error == pytest.approx(best.fun, rel=1e-6)
+
+
+@pytest.mark.parametrize("minimizer", ["SLSQP", slow("trust-constr")])
+def test_active_limit_holds_and_costs_as_little_as_possible(minimizer):
     m = fourbar()
     r2 = sympy.Symbol("r2")
     target = kc.targets.value("rocker.phi", [1.9, 1.7], [0.5, 1.0])
     free = kc.fit(m, target, bounds={"r2": (0.5, 3), "r4": (2, 4)}, samples=64, starts=4)
     longest = 0.8 * free.parameters["r2"]
     targets = [target, kc.targets.limit(r2, most=longest, title="crank")]
-    for minimizer in ("SLSQP", "trust-constr"):
-        found = kc.fit(
-            m, targets, bounds={"r2": (0.5, 3), "r4": (2, 4)}, samples=64, starts=4,
-            minimizer=minimizer,
-        )  # fmt: skip
-        assert found.limits[0].holds
-        assert found.parameters["r2"] == pytest.approx(longest, rel=2e-6)
-        # The least along the limit, by a scan of the other dimension.
-        module = kc.compile(m)
-        scan = found.parameters["r4"] + np.linspace(-0.02, 0.02, 41)
-        motion = kc.solve(module, [0.5, 1.0], {"r2": longest, "r4": scan})
-        errors = ((motion["rocker.phi"] - [1.9, 1.7]) ** 2).sum(axis=1)
-        assert found.error <= errors.min() * (1 + 1e-3)
+    bounds = {"r2": (0.5, 3), "r4": (2, 4)}
+    found = kc.fit(m, targets, bounds=bounds, samples=64, starts=4, minimizer=minimizer)
+    assert found.limits[0].holds
+    assert found.parameters["r2"] == pytest.approx(longest, rel=2e-6)
+    # The least along the limit, by a scan of the other dimension.
+    scan = found.parameters["r4"] + np.linspace(-0.02, 0.02, 41)
+    motion = kc.solve(kc.compile(m), [0.5, 1.0], {"r2": longest, "r4": scan})
+    errors = ((motion["rocker.phi"] - [1.9, 1.7]) ** 2).sum(axis=1)
+    assert found.error <= errors.min() * (1 + 1e-3)
 
 
 def test_transmission_angle_is_kept_over_the_whole_turn():
@@ -167,6 +195,52 @@ def test_transmission_angle_is_kept_over_the_whole_turn():
     assert whole.success
     assert whole["mu"].min() >= math.radians(45) - 1e-6
     assert whole["mu"].max() <= math.radians(135) + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("points", "ahead"),
+    [slow(5, 0.0), (9, 0.5), slow(73, 0.04)],
+)
+def test_limits_are_kept_between_the_times_of_the_model(points, ahead):
+    m = fourbar(points=points, ahead=ahead, r1=4.0, r2=1.5, r3=4.0, r4=3.0)
+    at = [0.5, 1.2]
+    own = kc.solve(kc.compile(m), at, {"r2": 1.9, "r4": 3.5})
+    target = kc.targets.path("P", np.column_stack((own["P.x"], own["P.y"])), at)
+    keep = kc.targets.limit("mu", least=45 * kc.deg, title="transmission angle")
+    bounds = {"r2": (0.3, 3), "r4": (2, 6)}
+    found = kc.fit(m, [target, keep], bounds=bounds, samples=64, starts=4)
+    r2, r4 = (found.parameters[name] for name in bounds)
+    # The angle is least where crank and ground lie on one line.
+    least = math.acos((4.0**2 + r4**2 - (4.0 - r2) ** 2) / (2 * 4.0 * r4))
+    assert least >= math.radians(45) - 1e-7
+    assert least == pytest.approx(math.radians(45), abs=1e-5)
+    assert found.limits[0].holds
+    assert found.limits[0].least == pytest.approx(least, abs=1e-9)
+
+
+def test_that_a_limit_which_is_broken_between_the_times_does_not_hold():
+    keep = kc.targets.limit("mu", least=80 * kc.deg, title="transmission angle")
+    target = kc.targets.path("P", [(3, 3), (2, 3.5)], [0.5, 1.2])
+    m = fourbar(points=5, ahead=math.pi / 4)
+    found = kc.fit(m, [target, keep], bounds={"u": (1, 2), "v": (1, 2)}, samples=32, starts=3)
+    least = math.acos((4.0**2 + 2.7**2 - (3.7 - 2.0) ** 2) / (2 * 4.0 * 2.7))
+    assert found.limits[0].least == pytest.approx(least, abs=1e-9)
+    assert not found.limits[0].holds
+    assert not found.success
+    assert found.errors == ()
+    assert len(found.outside) == found.counts.starts
+    assert list(found.outside) == sorted(found.outside)
+
+
+@pytest.mark.parametrize("rate", [slow("phi_dot"), "phi_ddot"])
+def test_limits_of_rates_are_judged_between_the_times(rate):
+    m = fourbar(points=5)
+    whole = kc.solve(kc.compile(m), np.linspace(0, 2 * math.pi, 20001))[f"rocker.{rate}"]
+    target = kc.targets.value("P.x", [3.0], [0.5])
+    keep = kc.targets.limit(f"rocker.{rate}", most=0.999 * whole.max())
+    found = kc.fit(m, [target, keep], bounds={"u": (1, 2)}, samples=16, starts=2)
+    assert not found.limits[0].holds
+    assert found.limits[0].greatest == pytest.approx(whole.max(), rel=1e-4)
 
 
 def test_result_never_jumps_its_branch():

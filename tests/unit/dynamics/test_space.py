@@ -75,7 +75,9 @@ def test_that_a_free_body_has_the_formulas_in_euler_parameters(seed):
             np.testing.assert_allclose(jacobian[:, k], slope, atol=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 5))]
+)
 def test_that_euler_s_equations_hold_whatever_the_origin_and_the_load(seed):
     """Newton and Euler in the body, with a centre of mass, forces and torques of every type."""
     inertia, c, s = inertia_of(seed), np.array([0.2, -0.1, 0.3]), np.array([0.4, 0.5, -0.6])

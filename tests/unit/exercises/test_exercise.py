@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from io import StringIO
@@ -15,7 +16,10 @@ import pytest
 import sympy
 
 import kincompile as kc
+from kincompile.checker.compare import compare
 from kincompile.exercises import kit as kits
+from kincompile.exercises import marking
+from kincompile.exercises import variants as drawing
 from kincompile.model.catalogue import CONSTRAINTS
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -117,6 +121,19 @@ def test_that_frames_that_are_turned_change_signs_and_not_the_motion() -> None:
     assert any(x < 0 for x, _ in points[1])
 
 
+def test_that_an_end_that_is_an_expression_is_that_of_the_variant() -> None:
+    (made,) = kc.exercise(read("swing_and_dwell.toml"), 1, 1).variants
+    model = read("swing_and_dwell.toml")
+    assert 0.5 * model.end < made.end < 1.5 * model.end
+    assert isinstance(made.end_given, float)
+
+
+def test_that_an_overconstrained_model_is_refused_by_name(monkeypatch: Any) -> None:
+    monkeypatch.setattr(drawing, "_drawn", None)  # no variant is drawn
+    with pytest.raises(kc.InputError, match=r"bennett is overconstrained.*replace the Revolute"):
+        kc.exercise(read("space/bennett.toml"))
+
+
 def test_that_a_model_without_parameters_varies_in_its_lengths() -> None:
     made = kc.exercise(read("slider_crank.toml"), 3, 1).variants
     assert len({str(item.constraints[1].point_i) for item in made}) > 1
@@ -191,8 +208,9 @@ def test_that_a_line_that_is_not_read_is_told(four_bar: Path) -> None:
     ("content", "reason"),
     [
         (None, "nothing handed in"),
-        (b"\xff\xfe\x00", "not a text in UTF-8"),
-        (b"B1 = 1\n" * 20_000, "more than 100000 bytes"),
+        (b"\xff\xfe\x00", "not text in UTF-8"),
+        (b"B1 = 1\n" * 20_000, "more than 100,000 bytes"),
+        (b"B1 = " + b" ;" * 45_000 + b"x", "cannot be read"),
         (b"", "not filled"),
     ],
 )
@@ -206,6 +224,120 @@ def test_that_a_hand_in_file_that_is_no_hand_in_has_no_points(
     row = rows_of(four_bar)["02"]
     assert row["points"] == "0"
     assert reason in row["reasons"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="links and pipes are those of POSIX")
+def test_that_what_is_no_file_of_ones_own_is_not_read(four_bar: Path) -> None:
+    path = four_bar / "students" / "02" / "hand_in.txt"
+    neighbour = four_bar / "students" / "01" / "hand_in.txt"
+
+    def sparse() -> None:
+        path.touch()
+        os.truncate(path, 20 * 2**30)
+
+    makers = (
+        (sparse, "more than 100,000 bytes"),
+        (lambda: path.symlink_to(neighbour), "it is a link"),
+        (lambda: os.mkfifo(path), "B1: cannot read hand_in.txt: it is a pipe or a device; save"),
+        (path.mkdir, "a folder"),
+    )
+    for make, reason in makers:
+        path.unlink(missing_ok=True)
+        make()
+        row = rows_of(four_bar)["02"]
+        assert (row["points"], reason in row["reasons"]) == ("0", True), row["reasons"]
+    path.rmdir()
+
+
+def test_that_one_student_does_not_stop_the_others(four_bar: Path, monkeypatch: Any) -> None:
+    fill(four_bar, "01", {})
+    fill(four_bar, "02", {})
+    usual = compare
+
+    def endless(reference: Any, **given: Any) -> Any:
+        while "endless" in str(given):
+            pass
+        return usual(reference, **given)
+
+    monkeypatch.setattr(marking, "compare", endless)
+    monkeypatch.setattr(marking, "SECONDS", 1)
+    fill(four_bar, "01", {"B1": lambda _: "endless"})
+    rows = rows_of(four_bar)
+    assert (rows["01"]["points"], rows["02"]["points"]) == ("0", "9")
+    assert "took more than 1 s or 2 GB" in rows["01"]["reasons"]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="others set no such limit")
+def test_that_a_student_who_takes_too_much_memory_has_no_points(
+    four_bar: Path, monkeypatch: Any
+) -> None:
+    usual = compare
+
+    def large(reference: Any, **given: Any) -> Any:
+        if "large" in str(given):
+            bytearray(2 * marking.MOST_MEMORY)
+        return usual(reference, **given)
+
+    monkeypatch.setattr(marking, "compare", large)
+    fill(four_bar, "01", {"B1": lambda _: "large"})
+    fill(four_bar, "02", {})
+    rows = rows_of(four_bar)
+    assert (rows["01"]["points"], rows["02"]["points"]) == ("0", "9")
+    assert "or 2 GB" in rows["01"]["reasons"]
+
+
+@pytest.mark.parametrize("has_processes", [True, False])
+def test_that_a_student_whose_marking_breaks_is_not_marked_again(
+    four_bar: Path, monkeypatch: Any, tmp_path: Path, has_processes: bool
+) -> None:
+    """Neither is done again without a budget, nor is it called too slow."""
+    log = tmp_path / "log"
+    fill(four_bar, "01", {})
+
+    def fails(reference: Any, **given: Any) -> Any:
+        with log.open("a") as stream:
+            stream.write(f"{os.getpid()}\n")
+        raise error
+
+    monkeypatch.setattr(marking, "compare", fails)
+    if not has_processes:
+        monkeypatch.delattr(os, "fork")
+    error: Exception = RecursionError("maximum recursion depth exceeded")
+    reasons = rows_of(four_bar)["01"]["reasons"]
+    assert "B1: stopped: a formula is nested too deeply; write shorter formulas" in reasons
+    error = KeyError("wobble")
+    with pytest.raises(kc.InternalError, match="marking ended by KeyError: 'wobble'") as caught:
+        kc.mark(four_bar)
+    assert "in fails" in caught.value.__notes__[0]
+    assert (str(os.getpid()) in log.read_text().split()) != has_processes
+    damaged = shutil.copytree(four_bar, tmp_path / "damaged")
+    (damaged / "instructor" / "models" / "01.toml").write_text("wobble = 1")
+    with pytest.raises(kc.InputError, match=r"01\.toml, line 1: this is not a model"):
+        kc.mark(damaged)
+
+
+def test_that_a_reason_commands_no_terminal_and_no_spreadsheet(four_bar: Path) -> None:
+    fill(four_bar, "01", {})
+    path = four_bar / "students" / "01" / "hand_in.txt"
+    path.write_text("B1 \x1b]0;pwned\x07 x\nB2 = \x1b[2J\nB3 = =1+1\n", encoding="utf-8")
+    table = kc.mark(four_bar).to_csv()
+    assert "\x1b" not in table
+    assert "\\x1b]0;pwned" in table
+    cells = [cell for row in rows_of(four_bar).values() for cell in row.values()]
+    assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@"))]
+
+
+def test_that_zeros_have_no_points(four_bar: Path) -> None:
+    a = "phi_crank"
+    zero = {
+        "01": f"7 + 1e15*sin(2*{a}) - 2e15*sin({a})*cos({a})",
+        "02": f"1.234e9*sin(2*{a}) - 2.468e9*sin({a})*cos({a})",
+    }
+    for student, text in zero.items():
+        fill(four_bar, student, {f"B{k}": lambda _, text=text: text for k in range(1, 10)})
+    rows = rows_of(four_bar)
+    assert [rows[student]["points"] for student in zero] == ["0", "0"]
+    assert "cannot be decided" in rows["01"]["reasons"]
 
 
 def test_that_a_page_has_hints_and_no_solution(four_bar: Path) -> None:

@@ -325,7 +325,7 @@ def test_that_a_huge_file_is_refused(tmp_path):
     path = tmp_path / "huge.toml"
     with path.open("wb") as stream:
         stream.truncate(50_000_000)
-    with pytest.raises(kc.ModelError, match=r"huge\.toml: the file has more than 16,000,000 bytes"):
+    with pytest.raises(kc.ModelError, match=r"huge\.toml: the file has more than 8,000,000 bytes"):
         kc.read(path)
 
 
@@ -379,3 +379,76 @@ def test_tables_of_commands_come_back(form):
     assert again.system().tasks == given
     assert toml(ARM).tasks == {}
     assert text == (again.to_toml() if form == "toml" else again.to_json())
+
+
+# What stands in a table of a command, and whether it may.
+FIT = "[fit]\nparameters = { length = [0.1, 2] }\ntargets = [{ moves = true }]\n"
+TABLES = {
+    "samples at the limit": (FIT + "samples = 1_048_576", ""),
+    "samples beyond it": (FIT + "samples = 1_048_577", "a whole number from 1 to 1,048,576"),
+    "starts at the limit": (FIT + "starts = 10_000", ""),
+    "starts beyond it": (FIT + "starts = 10_001", "a whole number from 1 to 10,000"),
+    "seed at the limit": (FIT + "seed = 4_294_967_295", ""),
+    "seed beyond it": (FIT + "seed = 4_294_967_296", "a whole number from 0 to 4,294,967,295"),
+    "no samples of a tolerance": ("[tolerance]\nsamples = 0", ""),
+    "most samples of a tolerance": ("[tolerance]\nsamples = 16_777_216", ""),
+    "too many samples of a tolerance": ("[tolerance]\nsamples = 16_777_217", "to 16,777,216"),
+    "misspelt field": (FIT + "sample = 3", "did you mean 'samples'"),
+    "misspelt field of a target": (FIT.replace("moves", "move"), "expected one target"),
+    "no targets": ("[fit]\nparameters = { length = [0.1, 2] }", "no targets; fields are"),
+    "date": ("[sweep]\nparameters = { length = [2026-01-01] }", "entry 1: expected a number, not"),
+    "number in quotes": ("[tolerance]\nparameters = { length = '1e-4' }", "without quotes"),
+    "date of a tolerance": (
+        "[tolerance]\nparameters = { length = 2026-01-01 }",
+        "a number, two limits, or {",
+    ),
+    "table as a list": ("[tolerance]\nof = 3", "expected a list of names in quotes, not 3"),
+    "search": (FIT + "search = 'ant'", "expected 'sobol', 'differential evolution', not 'ant'"),
+    "true for a number": (FIT + "seed = true", "a whole number from 0 to"),
+}
+
+
+@pytest.mark.parametrize(("table", "message"), TABLES.values(), ids=TABLES)
+def test_that_schema_and_reader_agree_on_tables_of_commands(table, message):
+    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema is not installed")
+    data = tomllib.loads(f"{ARM}\n{table}")
+    found = list(jsonschema.Draft202012Validator(model_schema()).iter_errors(data))
+    if message:
+        assert message in problems(f"{ARM}\n{table}")[0]
+        assert found
+    else:
+        toml(f"{ARM}\n{table}")
+
+
+def test_that_a_number_that_is_not_finite_is_no_value_of_a_command():
+    assert "inf is not a finite number" in problems(ARM + "[sweep]\nparameters = { a = [inf] }")[0]
+
+
+@pytest.mark.parametrize("text", ["10", " 1e5", "-.5", "2.", "+3_0"])
+def test_that_a_number_in_quotes_is_no_constant(text):
+    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema is not installed")
+    document = ARM.replace("1.0,", f'"{text}",')
+    assert "write the number itself" in problems(document)[0]
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(tomllib.loads(document), model_schema())
+
+
+@pytest.mark.parametrize("text", ["2*pi", "1/2", "-(3)"])
+def test_that_a_formula_is_a_constant(text):
+    jsonschema = pytest.importorskip("jsonschema", reason="jsonschema is not installed")
+    document = ARM.replace("1.0,", f'"{text}",')
+    assert toml(document).system().parameters[0].default > -4
+    jsonschema.validate(tomllib.loads(document), model_schema())
+
+
+@pytest.mark.parametrize(("name", "most"), [("samples", 2**20), ("starts", 10_000)])
+def test_that_a_fit_takes_as_many_as_a_file(name, most):
+    target = kc.targets.value("arm.phi", [1.0], [0.5])
+    with pytest.raises(kc.InputError, match=f"{name} is {most + 1}: .* from 1 to {most:,}"):
+        kc.fit(toml(ARM), target, bounds={"length": (0.1, 2)}, **{name: most + 1})
+
+
+def test_that_a_seed_is_one_that_every_generator_takes():
+    target = kc.targets.value("arm.phi", [1.0], [0.5])
+    with pytest.raises(kc.InputError, match="a whole number from 0 to 4,294,967,295"):
+        kc.fit(toml(ARM), target, bounds={"length": (0.1, 2)}, seed=2**32)

@@ -9,12 +9,12 @@ import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kincompile.files.formula_text import ExpressionError
 from kincompile.files.safe_expressions import (
     FUNCTIONS,
     MAX_DEPTH,
     MAX_LENGTH,
     MAX_NODES,
-    ExpressionError,
     parse_expression,
 )
 from kincompile.files.text_places import TextPlace
@@ -22,7 +22,13 @@ from kincompile.model.expressions import SMOOTH
 from kincompile.model.spline import PeriodicSpline
 
 x, y, phi3 = sympy.symbols("x y phi3")
-NAMES = {"x": x, "y": y, "phi3": phi3, "w": 2 * y}
+STEP = "Piecewise((x*{0}, y < {0}), (y, True))"
+NAMES = {"x": x, "y": y, "phi3": phi3, "w": 2 * y, "step": sympy.Piecewise((x, y < 1), (y, True))}
+
+
+def nested(levels):
+    """Return Piecewise of so many levels, each in the condition of the next."""
+    return "Piecewise((1, x < " * levels + "3" + "), (2, True))" * levels
 
 
 @pytest.mark.parametrize(
@@ -145,11 +151,28 @@ def test_that_code_is_refused(text: str, tmp_path: Path, monkeypatch: pytest.Mon
         ("-" * 10_000 + "x", "too deeply"),
         ("(" * 300 + "x" + ")" * 300, "brackets|nested|parentheses|operator"),
         ("+".join(["x"] * MAX_NODES), "more than"),
+        ("(((((7^64)^64)^64)^64)^64)", "too large"),
+        ("((((1/3)^-64)^64)^-64)^64", "too large"),
+        ("((((2*x)^64)^64)^64)^64", "too large"),
+        ("((7^(1/3))^64)^64", "too large"),
+        ("((x^8)^8)^2", "exponent is beyond 64"),
+        ("+".join(f"x/{p}^60" for p in range(3, 400, 2)), "too many digits"),
+        (nested(20), "values in conditions have more than 6 pieces"),
+        (f"Piecewise((1, {'+'.join(map(STEP.format, range(20)))} < 3), (2, True))", "6 pieces"),
+        (f"Piecewise((1, {' and '.join(['step < 3'] * 20)}), (2, True))", "6 pieces"),
     ],
 )
 def test_that_the_limits_hold(text: str, message: str) -> None:
     with pytest.raises(ExpressionError, match=message):
         parse_expression(text, NAMES)
+
+
+def test_that_pieces_are_free_outside_of_conditions() -> None:
+    value = "x"
+    for k in range(20):
+        value = f"Piecewise((y, x < {k}), (sin({value}), True))"
+    assert parse_expression(value, NAMES).subs(x, 2.5) == y
+    assert parse_expression(nested(2), NAMES).subs(x, 5) == 2
 
 
 def test_that_a_long_sum_is_one_level() -> None:

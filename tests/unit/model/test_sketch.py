@@ -2,6 +2,7 @@
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 import sympy
@@ -281,3 +282,10 @@ def test_that_it_shows_its_sizes():
     s = four_bar()
     s.link("crank", "O A", 1.0)
     assert repr(s) == "<Sketch 'four_bar': 5 joints, 1 links; .mechanism() makes the model>"
+
+
+def test_that_the_precision_of_mpmath_changes_no_text(example_named):
+    example = example_named("jansen")
+    with mpmath.workdps(60):
+        model = kc.read(example.path.with_suffix(".toml"))
+    assert kc.emit(model).source == example.source

@@ -48,10 +48,13 @@ def test_that_equations_are_in_order_of_the_constraints() -> None:
 def test_that_drivers_are_told_from_joints() -> None:
     m = kc.Mechanism("m")
     omega, body = m.parameter("omega", 2.0), m.body("b")
-    m.add(kc.AbsoluteAngle("held", body, omega))
+    m.add(kc.AbsoluteAngle("held", body, 2))
+    m.add(kc.AbsoluteAngle("set", body, 2 * omega))
+    m.add(kc.AbsoluteY("rail", body, (0, 0), omega))
     m.add(kc.AbsoluteX("moved", body, (0, 0), omega * kc.t))
     m.add(kc.Equation("free", body.y - kc.t))
-    assert [item.is_driver for item in m.system().constraints] == [False, True, True]
+    drivers = [item.name for item in m.system().constraints if item.is_driver]
+    assert drivers == ["set", "moved", "free"]
 
 
 def test_that_the_grid_and_the_units_go_along() -> None:

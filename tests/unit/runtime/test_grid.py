@@ -12,7 +12,7 @@ def both(module, t, **options):
     return (kc.solve(module, t, method=method, **options) for method in ("grid", "march"))
 
 
-@pytest.mark.parametrize("points", [33, 257, 2000])
+@pytest.mark.parametrize("points", [33, 257, pytest.param(2000, marks=pytest.mark.slow)])
 def test_every_example_has_the_same_motion_by_both_methods(example, points):
     ours, theirs = both(example.module, np.linspace(0, example.model.end, points))
     assert ours.success, ours.message
@@ -50,7 +50,7 @@ def test_that_a_time_may_repeat_on_a_grid(example_named, times):
     np.testing.assert_allclose(ours.q, theirs.q, rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("points", [100, 451, 2001])
+@pytest.mark.parametrize("points", [100, 451, pytest.param(2001, marks=pytest.mark.slow)])
 def test_that_a_grid_across_a_lock_up_has_the_verdict_of_the_march(example_named, points):
     module = example_named("problem_3_5_6").module
     ours, theirs = both(module, np.linspace(0, 5, points))

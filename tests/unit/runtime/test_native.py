@@ -111,6 +111,15 @@ def test_lists_integers_and_arrays_that_are_not_contiguous(four_bar):
     )
 
 
+@pytest.mark.parametrize("points", [1, 7, 8, 1000, 4096])
+def test_rows_of_a_batch_begin_where_cache_lines_do(four_bar, points):
+    native, _ = four_bar
+    q = np.tile(native.GUESS[:, np.newaxis], points)
+    for rows in native.kinematics_batch_last(q, q, 0.0):
+        assert rows.ctypes.data % 64 == 0
+        assert rows.strides[0] % 128 == 64
+
+
 def test_an_empty_batch_gives_empty_arrays(four_bar):
     native, module = four_bar
     q, q_dot, t = states(module, 0)

@@ -107,8 +107,21 @@ def test_safeguards_rescue_a_bad_guess(four_bar, guess, monkeypatch):
     steps = np.abs(np.diff(result.iterates, axis=0))[:, 2::3]
     assert steps.max() <= 0.5 + 1e-12
     assert result.iterates[0, [5, 8]].tolist() == list(guess.values())
-    monkeypatch.setattr("kincompile.runtime.newton.safeguarded_step", lambda *_: Status.SINGULAR)
+    monkeypatch.setattr("kincompile.runtime.start.safeguarded_step", lambda *_: Status.SINGULAR)
     assert newton(four_bar, 0, guess).status is not Status.CONVERGED
+
+
+@pytest.mark.parametrize("turns", [-2, -1, 1, 3])
+@pytest.mark.parametrize("longer", [0.99, 1.0, 1.01])
+def test_that_a_driven_angle_may_be_guessed_whole_turns_away(four_bar, turns, longer):
+    time = math.radians(-2) / 1.5  # the driver says -2 degrees: the guess is 358, 718, ... off
+    p = four_bar.DEFAULTS * [1, longer, 1, 1, 1]
+    for assembly in kc.assemblies(four_bar, time, p):
+        guess = assembly + [0.3, -0.3, 0.1] * 3
+        guess[2] += 2 * math.pi * turns
+        found = newton(four_bar, time, guess, p)
+        assert found.status is Status.CONVERGED
+        np.testing.assert_allclose(found.q, assembly, atol=1e-9)
 
 
 def test_safeguards_leave_a_singular_guess(four_bar):

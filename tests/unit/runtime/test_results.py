@@ -38,7 +38,7 @@ def test_csv_reads_back_to_the_last_bit(partial, tmp_path):
     np.testing.assert_array_equal(table[:, 7:10], partial.q_ddot)
     np.testing.assert_array_equal(table[:, 10], partial.status)
     np.testing.assert_array_equal(table[:, 11], partial.residual)
-    assert [row[10] for row in rows] == ["0", "0", "1", "4"]
+    assert [row[10] for row in rows] == ["0", "0", "7", "4"]
     assert path.read_bytes().count(b"\n") == 5
     assert b"\r" not in path.read_bytes()
 

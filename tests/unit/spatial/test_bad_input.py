@@ -31,6 +31,11 @@ WRONG: dict[str, tuple[Callable[[Any, Any, Any], Any], str]] = {
         lambda g, a, b: spatial.RevoluteCylindrical("J", g, O, Z, b, O, Z),
         "RevoluteCylindrical 'J': axis_i and axis_j are parallel at the guess of ground and b",
     ),
+    "shafts_apart": (
+        lambda g, a, b: spatial.ConstantVelocity("J", a, O, Z, X, b, O, -2 * Z, X),
+        "ConstantVelocity 'J': axis_i and axis_j point against each other at the guess of a and b, "
+        "and both should point along the shafts the same way; turn one of them round",
+    ),
     "crosses": (
         lambda g, a, b: spatial.Translational("J", a, O, X, Y, b, O, X, Y),
         "Translational 'J': cross_i and cross_j are parallel at the guess of a and b",

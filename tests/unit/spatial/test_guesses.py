@@ -1,5 +1,6 @@
 """Guesses of orientations in all their forms, and what is refused."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ from scipy.spatial.transform import Rotation
 import kincompile as kc
 from kincompile import spatial
 from kincompile.errors import KincompileWarning
+from tests.adversary.test_starts import in_javascript, in_octave
+from tests.targets.conftest import NODE, OCTAVE
 from tests.unit.spatial.test_motions import X, Y, Z
 
 TURN = Rotation.from_rotvec(0.7 * np.array([2, -1, 2]) / 3)
@@ -56,6 +59,29 @@ def test_that_an_angle_may_be_a_parameter() -> None:
     )
 
 
+@pytest.mark.parametrize("size", [1e200, 1e-200, 1e308])
+def test_that_any_length_is_divided_out(size: float) -> None:
+    with pytest.warns(KincompileWarning, match="and were divided by it"):
+        found = guess_of(orientation=(size, size, 0, 0))
+    np.testing.assert_allclose(found[3:], (np.sqrt(0.5), np.sqrt(0.5), 0, 0), atol=1e-15)
+    found = guess_of(axis=(0, size, size), angle=np.pi)
+    np.testing.assert_allclose(found[3:], (0, 0, np.sqrt(0.5), np.sqrt(0.5)), atol=1e-15)
+
+
+def test_that_every_rotation_matrix_is_read() -> None:
+    """Against SciPy's; half turns, and turns close to them, among them."""
+    rng = np.random.default_rng(4)
+    axes = [*np.eye(3), *rng.normal(size=(20, 3))]
+    for axis in axes:
+        for angle in (0, 1e-9, 1, np.pi - 1e-9, np.pi, 4, *rng.uniform(0, 7, 3)):
+            turn = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))
+            found = guess_of(orientation=turn.as_matrix())[3:]
+            expected = turn.as_quat()[[3, 0, 1, 2]]
+            assert found[0] >= 0
+            assert abs(found @ expected) == pytest.approx(1, abs=1e-15)
+            np.testing.assert_allclose(found * np.sign(found @ expected), expected, atol=4e-16)
+
+
 def test_that_another_length_is_divided_out_and_said() -> None:
     with pytest.warns(KincompileWarning, match="body 'rod': the Euler parameters have length 2,"):
         found = guess_of((2 * np.array(P)).tolist())
@@ -94,3 +120,65 @@ def test_what_is_no_position() -> None:
     with pytest.raises(kc.ModelError, match=r"body 'rod': the guess .* is not") as caught:
         m.system()
     assert "body 'arm': the guess" in str(caught.value)
+
+
+def crank() -> spatial.Mechanism:
+    m = spatial.Mechanism("crank")
+    body = m.body("rod")
+    m.add(spatial.Revolute("O", m.ground, (0, 0, 0), Z, body, (0, 0, 0), Z))
+    m.add(spatial.RelativeRotation("motor", m.ground, Z, X, body, Z, X, 0.3 + kc.t))
+    return m
+
+
+@pytest.mark.parametrize("guess", [[0] * 7, {"rod.e0": 0}])
+def test_that_zeros_are_no_orientation_to_start_from(guess: Any) -> None:
+    with pytest.raises(kc.InputError, match=r"the guess of 'rod' has Euler parameters of length"):
+        kc.solve(kc.compile(crank()), 0.0, guess=guess)
+
+
+LONG = [1e-200, 1e-6, 5.0, 1e16, 1e155, 1e300]
+
+
+@pytest.mark.parametrize("options", [{}, pytest.param({"target": "c"}, marks=pytest.mark.slow)])
+def test_that_an_orientation_to_start_from_may_have_any_length(options: Any) -> None:
+    module = kc.compile(crank(), **options)
+    near = kc.solve(module, 0.0, guess=[0, 0, 0, 0.8, 0, 0, 0.6])
+    for size in LONG:
+        guess = [0, 0, 0, 0.8 * size, 0, 0, 0.6 * size]
+        np.testing.assert_allclose(kc.solve(module, 0.0, guess=guess).q, near.q, atol=1e-14)
+    for name, value in {"e0": 1e300, "x": 1e155, "z": -1e300}.items():
+        assert kc.solve(module, 0.0, guess={f"rod.{name}": value}).success
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(OCTAVE is None or NODE is None, reason="needs octave-cli and node")
+def test_that_it_may_in_octave_and_javascript(tmp_path: Path) -> None:
+    guesses = np.array([[0, 0, 0, 0.8 * size, 0, 0, 0.6 * size] for size in [1.0, *LONG, 1.0]])
+    guesses[-1, 0] = 1e300
+    near = kc.solve(kc.compile(crank()), 0.0, guess=guesses[0]).q[0]
+    for is_found, q in in_octave(tmp_path, crank(), guesses):
+        assert is_found
+        np.testing.assert_allclose(q, near, atol=1e-14)
+    for status, q, *_ in in_javascript(tmp_path, crank(), 0.0, guesses):
+        assert status.tolist() == [kc.Status.CONVERGED]
+        np.testing.assert_allclose(q[0], near, atol=1e-14)
+
+
+@pytest.mark.filterwarnings("ignore::kincompile.AssemblyWarning")
+@pytest.mark.parametrize("p", [(np.sqrt(0.5), 0, np.sqrt(0.5), 0), (0.5, -0.5, 0.5, 0.5)])
+def test_that_a_cross_may_lie_along_the_axis_at_a_guess(p: Any) -> None:
+    """No angle is defined there."""
+    found = kc.solve(kc.compile(crank()), 0.0, guess=[0, 0, 0, *p])
+    assert found.success
+    turn = spatial.orientation(found, "rod").apply(X)
+    np.testing.assert_allclose(turn[..., :2], [[np.cos(0.3), np.sin(0.3)]], atol=1e-12)
+
+
+def test_that_a_guess_that_is_no_number_is_said_as_such_and_nothing_else() -> None:
+    m = spatial.Mechanism("door")
+    door = m.body("door")
+    m.add(spatial.Revolute("H", m.ground, (0, 0, 0), Z, door, (0, 0, 0), Z))
+    m.add(spatial.RelativeRotation("motor", m.ground, Z, X, door, Z, X, kc.t))
+    with pytest.raises(kc.InputError) as caught:
+        kc.solve(kc.compile(m), 0.0, guess={"door.e0": np.nan})
+    assert caught.value.problems == ("coordinate 'e0_door' is nan: give a finite number.",)

@@ -14,7 +14,7 @@ import kincompile as kc
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.space import TurnedFrame
 from kincompile.cli import cli
-from kincompile.derivation.assembled import IDENTITIES
+from kincompile.derivations.assembled import IDENTITIES
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import partials
 from kincompile.space.catalogue import CONSTRAINTS

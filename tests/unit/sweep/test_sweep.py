@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import kincompile as kc
-from kincompile.sweep.plan import Plan
+from kincompile.sweeps.plan import Plan
 from tests.unit.sweep.models import TIMES, crank, files_of, folding, processes
 
 LENGTHS = np.array([0.2, 0.5, 0.9, 1.1, 1.7])
@@ -88,16 +88,18 @@ def test_what_cannot_be_assembled_is_a_status_and_disturbs_nobody():
     found = sweep(folding(), {"b": b}, columns=["angle"], measures=["angle.mean"])
     status, data = found.to_xarray()["status"].values, found.to_xarray()
     assert (status[[0, 2]] == 0).all()
-    assert status[1].tolist() == [1, 4, 4, 4, 4]
+    assert status[1].tolist() == [6, 4, 4, 4, 4]
     assert np.isfinite(data["angle"].values[[0, 2]]).all()
     assert np.isnan(data["angle_mean"].values).tolist() == [False, True, False]
-    assert found.statuses() == {"CONVERGED": 10, "NOT_CONVERGED": 1, "NOT_REACHED": 4}
-    assert "3 variants x 5 times; points: 10 CONVERGED, 1 NOT_CONVERGED" in str(found)
+    assert found.statuses() == {"CONVERGED": 10, "NOT_REACHED": 4, "NOT_ASSEMBLED": 1}
+    assert "3 variants x 5 times; points: 10 CONVERGED, 4 NOT_REACHED, 1 NOT_ASSEMBLED" in str(
+        found
+    )
 
 
 def test_of_measures_alone_the_status_is_that_of_the_motion():
     found = sweep(folding(), {"b": [1.0, 0.1]}, measures=["angle.mean"])
-    assert found.to_xarray()["status"].values.tolist() == [0, 1]
+    assert found.to_xarray()["status"].values.tolist() == [0, 6]
 
 
 def test_all_chunks_start_in_the_assembly_of_the_first_set():
@@ -212,3 +214,25 @@ def test_what_is_sent_with_a_chunk_does_not_grow_with_the_sweep(ending, tmp_path
         with pytest.raises(kc.SweepError, match="enough"):
             sweep(p={"a": np.linspace(1, 2, count)}, chunk=5, store=store, executor=Noting())
     assert abs(sizes[1] - sizes[0]) < 200
+
+
+def test_a_sweep_goes_through_bifurcations_where_it_is_told():
+    m = kc.Mechanism("parallelogram", end=0.7, points=15)
+    length = m.parameter("L", 1.0)
+    a, b, c = (
+        m.body("a", guess=(0, 0, 0.6)),
+        m.body("b", guess=(0.8, 0.6, 0)),
+        m.body("c", guess=(2, 0, 0.6)),
+    )
+    m.add(kc.Revolute("O", m.ground, (0, 0), a, (0, 0)))
+    m.add(kc.Revolute("A", a, (length, 0), b, (0, 0)))
+    m.add(kc.Revolute("B", b, (2, 0), c, (length, 0)))
+    m.add(kc.Revolute("C", c, (0, 0), m.ground, (2, 0)))
+    m.add(kc.AbsoluteAngle("motor", a, 0.6 + 2 * kc.pi * kc.t))
+    options = {"p": {"L": [0.8, 1.0]}, "columns": ["phi_b"], "product": False}
+    assert set(sweep(m, **options).statuses()) == {"CONVERGED", "SINGULAR", "NOT_REACHED"}
+    found = sweep(m, **options, through="smooth")
+    assert found.statuses() == {"CONVERGED": 30}
+    np.testing.assert_allclose(found["phi_b"], 0, atol=1e-9)
+    with pytest.raises(kc.InputError, match="through is 'straight'"):
+        sweep(m, **options, through="straight")

@@ -2,17 +2,20 @@
 
 import multiprocessing
 import os
+import re
 import resource
 import signal
 import subprocess
 import sys
 from concurrent.futures import Future
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import kincompile as kc
+from kincompile.sweeps.folder import written
 from tests.unit.sweep import killed
 from tests.unit.sweep.models import crank, files_of, folding, processes
 
@@ -46,7 +49,7 @@ def test_a_worker_that_dies_is_an_error_and_what_was_solved_is_kept(store, tmp_p
 
     with (
         processes(2) as executor,
-        pytest.raises(kc.SweepError, match=r"crank: the executor stopped after \d+ of 20 ch") as e,
+        pytest.raises(kc.SweepError, match=r"crank: the sweep stopped after \d+ of 20 ch") as e,
     ):
         killed.sweep(place, executor=executor, progress=kill)
     assert "the same call" in str(e.value)
@@ -155,7 +158,10 @@ def test_a_place_that_no_sweep_wrote_is_refused(ending, tmp_path):
         ({"measures": ["x_arm.stroke"]}, "x_arm is no output"),
         ({"columns": ["a.b"], "measures": ["x.y"]}, "2 problems"),
         ({"chunk": 0}, "chunk is 0"),
-        ({"p": dict.fromkeys(("a", "omega"), np.ones(100_000)), "product": True}, "have 810 GB"),
+        (
+            {"p": dict.fromkeys(("a", "omega"), np.ones(100_000)), "product": True},
+            "have 810.0 GB, more than this machine has memory: give a store",
+        ),
         (
             {"p": dict.fromkeys(("a", "omega"), np.ones(100_000)), "product": True, "chunk": 1},
             "10,000,000,000 variants are 10,000,000,000 chunks, more than 10,000,000",
@@ -170,6 +176,62 @@ def test_what_is_wrong_is_said_in_names(options, message):
         sweep(**options)
 
 
+def test_a_file_that_another_run_has_taken_for_a_leftover_is_written_again(tmp_path):
+    missing = [FileNotFoundError("half"), FileNotFoundError("half")]
+
+    def write():
+        if missing:
+            raise missing.pop()
+
+    written(tmp_path, write)
+    missing += 3 * [FileNotFoundError("half")]
+    with pytest.raises(kc.InputError, match=r"cannot write to .*half"):
+        written(tmp_path, write)
+
+
+@pytest.mark.filterwarnings("ignore::kincompile.DamagedStoreWarning")
+@pytest.mark.parametrize(
+    "name", ["a.parquet/part-0.parquet", "a.parquet/_sha256/0", "a.zarr/x_tip/c/0/0"]
+)
+def test_a_folder_in_the_place_of_a_file_is_named(name, tmp_path):
+    store = tmp_path / name.split("/")[0]
+    sweep(store=store)
+    place = tmp_path / name
+    place.unlink()
+    place.mkdir()
+    with pytest.raises(kc.InputError, match=f"cannot write to {re.escape(str(place))}: "):
+        sweep(store=store)
+
+
+def test_too_little_memory_is_said_with_the_way_out(monkeypatch):
+    monkeypatch.setattr(import_module("kincompile.sweeps.store"), "_memory", lambda: 1e9)
+    grid = {"product": True, "p": {"a": np.ones(10_000), "omega": np.ones(900)}}
+    with pytest.raises(kc.InputError, match=r"9,000,000 variants have 0\.7 GB, more than this mac"):
+        sweep(**grid)
+    status = Path("/proc/self/statm").read_text(encoding="ascii").split()
+    used = int(status[0]) * resource.getpagesize()
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (used + 400_000_000, before[1]))
+    try:
+        monkeypatch.setattr(import_module("kincompile.sweeps.store"), "_memory", lambda: 1e12)
+        with pytest.raises(
+            kc.InputError, match=r"have 0\.7 GB, more than .* give a store, such as"
+        ):
+            sweep(**grid)
+        many = {"a": np.ones(1_000_000)}
+        with pytest.raises(kc.InputError, match=r"1,000,000 variants at 9 times have 0\.6 GB"):
+            sweep(p=many, chunk=1_000_000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+    def run(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(import_module("kincompile.sweeps.chunks"), "run", run)
+    with pytest.raises(kc.SweepError, match=r"stopped after 0 of 1 chunks \(MemoryError\)"):
+        sweep()
+
+
 def test_a_first_set_that_cannot_be_assembled_does_not_stop_the_others():
     found = kc.sweep(folding(), {"b": [0.1, 1.0, 1.1]}, columns=["angle"], target="numpy", chunk=1)
-    assert found.statuses() == {"CONVERGED": 10, "NOT_CONVERGED": 1, "NOT_REACHED": 4}
+    assert found.statuses() == {"CONVERGED": 10, "NOT_REACHED": 4, "NOT_ASSEMBLED": 1}

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kincompile.targets.lines import broken, labelled, quoted, table, wrapped
+from kincompile.emitters.lines import broken, labelled, quoted, table, wrapped
 
 words = st.lists(st.text("abcxyz", min_size=1, max_size=12), min_size=1, max_size=30)
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kincompile.targets.naming import NameTable
-from kincompile.targets.schedule import content_name
+from kincompile.emitters.naming import NameTable
+from kincompile.emitters.schedule import content_name
 
 names = st.sampled_from(["x", "x_", "x_2", "x_3", "lambda", "lambda_", "is", "q", "np", "a_b"])
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kincompile.emitters.numpy.dialect import NUMPY
+from kincompile.emitters.printer import Printer
 from kincompile.ir.graph import Graph, operands_of
-from kincompile.targets.numpy.dialect import NUMPY
-from kincompile.targets.printer import Printer
 
 VALUES = {"x": Fraction(3, 7), "y": Fraction(-5, 2)}
 

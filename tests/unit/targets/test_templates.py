@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from kincompile.emitters import templates
+from kincompile.emitters.templates import fill
 from kincompile.errors import TemplateError
-from kincompile.targets import templates
-from kincompile.targets.templates import fill
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from kincompile.targets.templates import read
+from kincompile.emitters.templates import read
 from kincompile.view.shapes import HUES
 
 SCHEMES = ("light", "dark")

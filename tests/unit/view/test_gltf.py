@@ -156,6 +156,35 @@ def test_the_turns_of_a_rod_reach_every_direction():
     np.testing.assert_allclose(turned[:2], np.tile((0, 0, 0, 1), (2, 1)))
 
 
+def directions() -> np.ndarray:
+    """Return directions, along axes and any, each with those nearly and exactly opposite to it."""
+    rng = np.random.default_rng(7)
+    found = [Z]
+    for axis in (*np.eye(3), *-np.eye(3), *rng.normal(size=(40, 3))):
+        along = axis / np.linalg.norm(axis)
+        across = np.cross(along, rng.normal(size=3))
+        for angle in (0.0, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-3):
+            found += [along, -(along + angle * across / np.linalg.norm(across))]
+    return np.array([axis / np.linalg.norm(axis) for axis in found])
+
+
+def test_that_a_rod_turns_right_about_whatever_its_direction():
+    axes = directions()
+    for order in (axes, axes[::-1], np.random.default_rng(1).permutation(axes)):
+        turns = _turns_to(order)
+        assert np.abs(Rotation.from_quat(turns).apply(Z) - order).max() < 1e-10
+        # The shortest turn: what it is about is across both, so half a turn at most.
+        steps = Rotation.from_quat(turns[1:]) * Rotation.from_quat(turns[:-1]).inv()
+        between = np.arccos(np.clip(np.sum(order[1:] * order[:-1], axis=1), -1, 1))
+        np.testing.assert_allclose(steps.magnitude(), between, atol=1e-6)
+    assert np.abs(Rotation.from_quat(_turns_to(3.0 * axes)).apply(Z) - axes).max() < 1e-10
+
+
+def test_that_a_rod_without_a_length_keeps_its_direction():
+    turns = _turns_to(np.array([2 * X, 0 * X, -X, 0 * X]))
+    assert np.abs(Rotation.from_quat(turns).apply(Z) - [X, X, -X, -X]).max() < 1e-12
+
+
 def test_times_and_what_is_refused(motion, tmp_path):
     times, _ = keyframes(kc.animate(motion, tmp_path / "a.glb", seconds=6).read_bytes())
     np.testing.assert_allclose(times[[0, -1]], (0, 6))

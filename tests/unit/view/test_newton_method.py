@@ -9,9 +9,9 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.runtime.newton import iterate
+from kincompile.emitters.templates import read
+from kincompile.runtime.corrector import iterate
 from kincompile.runtime.problem import problem
-from kincompile.targets.templates import read
 from kincompile.view.page_scripts import MOST_COORDINATES, solver_script
 
 NODE = shutil.which("node") or shutil.which("nodejs")

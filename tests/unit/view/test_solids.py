@@ -9,10 +9,11 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import kincompile as kc
+from kincompile.emitters.templates import read
 from kincompile.errors import InputError
-from kincompile.targets.templates import read
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import GROUND_FRAME, FramePoint, Span, Symbol
 from kincompile.view.solid_picture import Camera
@@ -110,16 +111,120 @@ def test_the_hull_of_a_box_of_a_plate_and_of_a_line():
     assert wires(((1.0, 0.0, 0.0),)) == ([], [])
 
 
-def test_that_the_page_has_the_parts_that_python_has(drawn, motion):
+def turned(points: Any) -> Any:
+    """Return points in generic directions."""
+    return np.array(points, dtype=float) @ Rotation.from_rotvec((0.3, -1.1, 0.7)).as_matrix()
+
+
+def sets_of_points() -> dict[str, np.ndarray]:
+    """Return points as bodies may have them: on a box, in a plane, on a line, at one place."""
+    rng = np.random.default_rng(8)
+    grid = np.array(list(itertools.product((0.0, 1.0, 2.0), repeat=3)))
+    ring = np.array([(np.cos(x), np.sin(x), z) for z in (0, 1) for x in np.arange(8) * np.pi / 4])
+    found = {
+        "box": np.array(CUBE), "turned box": turned(CUBE), "grid": grid,
+        "turned grid": turned(grid),
+        "far away": 1e4 + turned(grid), "small": 1e-7 * turned(CUBE), "prism": turned(ring),
+        "plate": turned(grid[grid[:, 2] == 0]), "line": turned(grid[grid[:, :2].sum(1) == 0]),
+        "one place": np.ones((4, 3)), "one point": np.ones((1, 3)),
+        "twice": turned(np.repeat(CUBE, 2, axis=0)), "nearly twice": np.vstack((CUBE, CUBE)),
+        "tetrahedron": rng.normal(size=(4, 3)), "random": rng.normal(size=(14, 3)),
+        "ball": np.array([x / np.linalg.norm(x) for x in rng.normal(size=(16, 3))]),
+        "nearly flat": turned(grid) * (1, 1, 1e-12),
+    }  # fmt: skip
+    found["nearly twice"][8:] += 1e-9 * rng.normal(size=(8, 3))
+    return found
+
+
+def faces_by_all_triples(places: np.ndarray) -> list[tuple[frozenset[int], np.ndarray]]:
+    """Return faces by their definition: planes through three points with no point outside."""
+    near = 1e-6 * np.max(np.linalg.norm(places - places[0], axis=1), initial=0.0)
+    own = [
+        k for k, x in enumerate(places)
+        if all(np.linalg.norm(x - other) > near for other in places[:k])
+    ]  # fmt: skip
+    found: list[tuple[frozenset[int], np.ndarray]] = []
+    triples = np.array(list(itertools.combinations(own, 3)), dtype=int).reshape(-1, 3)
+    first, second, third = np.moveaxis(places[triples], 1, 0)
+    normals = np.cross(second - first, third - first)
+    sizes, sides = (np.linalg.norm(x, axis=1) for x in (normals, second - first))
+    is_plane = sizes > 1e-6 * sides * np.linalg.norm(third - first, axis=1)
+    normals = normals[is_plane] / sizes[is_plane, None]
+    ways = np.einsum("tnk,tk->tn", places[own] - first[is_plane][:, None], normals)
+    for sign in (1, -1):
+        is_face = (sign * ways <= near).all(axis=1)
+        for way, normal in zip(ways[is_face], sign * normals[is_face], strict=True):
+            on = frozenset(np.array(own)[np.abs(way) <= near].tolist())
+            if not any(on == other and normal @ out > 0 for other, out in found):
+                found.append((on, normal))
+    return found
+
+
+HULLS = """
+const sets = JSON.parse(require('fs').readFileSync(0, 'utf8'));
+console.log(JSON.stringify(sets.map(wiresAround)));
+"""
+
+
+def in_node(program: str, given: Any) -> Any:
     if shutil.which("node") is None:
         pytest.skip("node is not installed")
-    positions = motion.q[::13]
-    given = json.dumps({"drawing": drawn.to_json(), "positions": positions.tolist()})
-    program = read("view/draw.js") + read("view/space.js") + PROGRAM
+    text = read("view/draw.js") + read("view/space.js") + program
     done = subprocess.run(
-        ["node", "-e", program], input=given, capture_output=True, text=True, check=True
+        ["node", "-e", text], input=json.dumps(given), capture_output=True, text=True, check=True
     )
-    for q, on_page in zip(positions, json.loads(done.stdout), strict=True):
+    return json.loads(done.stdout)
+
+
+def test_that_hulls_have_the_faces_of_their_definition_in_python_and_on_the_page():
+    known = sets_of_points()
+    on_page = in_node(HULLS, [points.tolist() for points in known.values()])
+    for (name, points), page in zip(known.items(), on_page, strict=True):
+        places = tuple(map(tuple, points.tolist()))
+        expected = faces_by_all_triples(points)
+        for faces, edges in (wires(places), ([x.values() for x in page["faces"]], page["edges"])):
+            assert len(faces) == len(expected), name
+            for corners, normal in faces:
+                own = frozenset(places.index(tuple(corner)) for corner in corners)
+                alike = [out for on, out in expected if own <= on and out @ np.array(normal) > 0.5]
+                assert len(alike) >= 1, name
+                np.testing.assert_allclose(normal, max(alike, key=lambda n: n @ normal), atol=1e-6)
+                loop = np.array(list(corners))
+                area = sum(np.cross(a, b) for a, b in itertools.pairwise((loop - loop[0])[1:]))
+                assert area @ np.array(normal) > 0, name
+            if name in ("box", "turned box", "grid", "prism", "tetrahedron", "random", "ball"):
+                vertices = {tuple(corner) for corners, _ in faces for corner in corners}
+                assert len(vertices) - len(edges) + len(faces) == 2, name  # Euler
+
+
+COUNTED = """
+let count = 0;
+const random = JSON.parse(require('fs').readFileSync(0, 'utf8'));
+const distance = distanceBetween, across = beyond;
+distanceBetween = (...given) => { count += 1; return distance(...given); };
+beyond = (...given) => { count += 1; return across(...given); };
+console.log(JSON.stringify(random.map(points => {
+  count = 0;
+  wiresAround(points);
+  return count;
+})));
+"""
+
+
+def test_that_the_work_for_a_hull_grows_with_the_square_of_its_points():
+    ball = np.random.default_rng(3).normal(size=(240, 3))
+    ball /= np.linalg.norm(ball, axis=1)[:, None]
+    counts = in_node(COUNTED, [ball[:n].tolist() for n in (60, 120, 240)])
+    assert counts[1] < 5 * counts[0]
+    assert counts[2] < 5 * counts[1]
+    faces, edges = wires(tuple(map(tuple, ball.tolist())))
+    assert (len(faces), len(edges)) == (2 * 240 - 4, 3 * 240 - 6)
+
+
+def test_that_the_page_has_the_parts_that_python_has(drawn, motion):
+    positions = motion.q[::13]
+    shown = in_node(PROGRAM, {"drawing": drawn.to_json(), "positions": positions.tolist()})
+    for q, on_page in zip(positions, shown, strict=True):
         for item, known in zip(solids(drawn), on_page, strict=True):
             parts = item.parts(Position(q))
             assert len(parts) == len(known)

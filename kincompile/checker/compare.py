@@ -1,0 +1,283 @@
+"""Comparison of hand-derived formulas with the generated ones.
+
+generated   the formulas the compiler derives, evaluated at random states   reference.py, states.py
+written     the formulas of the author: texts, arrays, functions            written.py, hand_file.py
+match       rows, columns, signs, scales that conventions leave open        matching.py, layouts.py
+agree       entry by entry: equal, undecided, different                     agreement.py
+            each of them judged                                             comparer.py
+            M and Q, which are sums over masses and loads                   load_comparer.py
+diagnose    the fault of the catalogue that gives the numbers that differ   diagnosis.py, *fault*.py
+report      entries with verdicts, for people and for machines              report.py
+
+Equality is decided by numbers at a dozen random states, never by simplification.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from kincompile.checker.comparer import NUMBERS, Comparer
+from kincompile.checker.comparison import Verdict
+from kincompile.checker.conventions import stated_conventions
+from kincompile.checker.given_forms import Forms
+from kincompile.checker.hand_file import read_hand_file
+from kincompile.checker.load_comparer import LoadComparer
+from kincompile.checker.reference import COMPARED, OF_LOADS, QUANTITIES, Reference, Subject
+from kincompile.checker.report import Report
+from kincompile.checker.states import given_states
+from kincompile.checker.written import TOLD, read_written, vocabulary
+from kincompile.errors import InputError
+from kincompile.names import listed
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
+
+    from kincompile.checker.states import States
+    from kincompile.checker.written import Written
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+
+
+def compare(
+    model: Mechanism | ConstraintSystem | Reference,
+    Phi: object = None,
+    Phi_q: object = None,
+    nu: object = None,
+    gamma: object = None,
+    M: object = None,
+    Q: object = None,
+    *,
+    constraint: str | None = None,
+    aliases: Mapping[str, object] | None = None,
+    conventions: Mapping[str, str] | None = None,
+    states: Mapping[str, ArrayLike] | None = None,
+    strict: bool = False,
+) -> Report:
+    r"""Compare hand-derived Phi, Phi_q, nu, gamma, M and Q with the generated ones.
+
+    :math:`\Phi_q \dot q = \nu = -\Phi_t` and :math:`\Phi_q \ddot q = \gamma = -(\Phi_q \dot q)_q
+    \dot q - 2 \Phi_{qt} \dot q - \Phi_{tt}` (Haug, section 3.1); :math:`M \ddot q + \Phi_q^T
+    \lambda = Q` (section 6.3), where weight and the forces of inertia that are quadratic in the
+    rates belong to Q.
+
+    Parameters
+    ----------
+    model
+        The mechanism or system; a `Reference` made of it, where many are compared with one model.
+    Phi, Phi_q, nu, gamma, M, Q
+        At least one, derived by hand: text such as ``[[1, 0, 0.25*cos(phi3)], ...]``, nested lists
+        of numbers, texts and SymPy expressions, a SymPy matrix, an array, or a function ``f(q, t)``
+        (of gamma and Q ``f(q, q_dot, t)``), which may take the parameters p as a last argument.
+    constraint
+        Name of the one constraint that is checked alone. Phi_q then has the columns of the whole
+        system, or of the constraint's bodies, i before j; in space seven a body, or six.
+    aliases
+        Names of the author's own, each with its expression, for instance ``{"w": "phi3_dot"}``.
+    conventions
+        What the author says that nu and gamma are: ``{"nu": "Phi_t", "gamma": "left side"}`` have
+        the opposite sign, which is a mistake where it is not stated. In space ``form`` says by what
+        Phi_q has derivatives, and gamma the second rates: ``"r-p"`` (ME751), ``"r-omega"`` (Haug:
+        r and small rotations about the body's axes, without norm rows) or ``"global r-omega"``; the
+        shape and the numbers say it where it is not stated.
+    states
+        States at which the values of arrays belong: ``q`` (N, n), and where they matter ``q_dot``
+        (N, n), ``t`` (N,), ``p`` (N, k). Random states where None.
+    strict
+        Whether an entry must be equal to the generated one to be accepted, without a convention
+        and at states off the constraint manifold too.
+
+    Returns
+    -------
+    Report
+        Verdict and diagnosis of every entry, and the conventions in which the two differ.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written.
+    InputError
+        If a formula cannot be read, holds an unknown name, or has the wrong shape.
+    """
+    given = {"Phi": Phi, "Phi_q": Phi_q, "nu": nu, "gamma": gamma, "M": M, "Q": Q}
+    forms = Forms(_reference(model), stated_conventions(conventions or {}), constraint)
+    written = _read(forms, given, aliases or {}, at_states=states is not None)
+    return _compared(forms, written, states, strict)
+
+
+def _reference(model: Mechanism | ConstraintSystem | Reference) -> Reference:
+    return model if isinstance(model, Reference) else Reference(model)
+
+
+def _states(
+    reference: Reference, written: Mapping[str, Written], given: Mapping[str, ArrayLike] | None
+) -> States:
+    """Return where to compare: functions without parameters have the default ones."""
+    if given is not None:
+        return reference.normalised(given_states(given, reference.system))
+    if all(item.takes_parameters for item in written.values()):
+        return reference.random
+    return reference.random.with_default_parameters(reference.defaults)
+
+
+def compare_file(
+    model: Mechanism | ConstraintSystem | Reference,
+    path: str | os.PathLike[str],
+    *,
+    constraint: str | None = None,
+    strict: bool = False,
+) -> Report:
+    """Compare a hand file with the generated formulas.
+
+    Parameters
+    ----------
+    model
+        As for `compare`.
+    path
+        The hand file: TOML, JSON or lines ``Name = [[...]]``; see `read_hand_file`.
+    constraint
+        Name of the one constraint that is checked alone; the file's own where None.
+    strict
+        As for `compare`.
+
+    Returns
+    -------
+    Report
+        As `compare` gives it.
+
+    Raises
+    ------
+    ModelError, InputError
+        As `compare` does; a message begins with the file and the line.
+    """
+    file = read_hand_file(Path(path))
+    reference = _reference(model)
+    constraint = file.constraint if constraint is None else constraint
+    if constraint is not None:
+        reference.block(constraint)
+    try:
+        forms = Forms(reference, stated_conventions(file.conventions), constraint)
+        written = _read(forms, file.quantities, file.aliases)
+    except InputError as error:
+        raise InputError([f"{file.name}, {problem}" for problem in error.problems]) from error
+    return _compared(forms, written, None, strict)
+
+
+def _compared(
+    forms: Forms,
+    written: Mapping[str, Written],
+    given: Mapping[str, ArrayLike] | None,
+    strict: bool,
+) -> Report:
+    """Compare in each form that fits, until one explains everything; the best is reported."""
+    of_equations, of_loads = (
+        {name: item for name, item in written.items() if name in names}
+        for names in (QUANTITIES, OF_LOADS)
+    )
+    reports = []
+    if of_equations:
+        reports.append(_best(forms, of_equations, given, strict).report())
+    if of_loads:
+        states = _states(forms.reference, written, given)
+        subject = Subject(forms.reference, None, states)
+        reports.append(_of_loads(subject, of_loads, strict))
+    report, *others = reports
+    for added in others:
+        conventions = tuple(dict.fromkeys((*report.conventions, *added.conventions)))
+        entries = report.entries + added.entries
+        report = replace(report, entries=entries, conventions=conventions)
+    return report
+
+
+def _best(
+    forms: Forms,
+    written: Mapping[str, Written],
+    given: Mapping[str, ArrayLike] | None,
+    strict: bool,
+) -> Comparer:
+    """Return the comparison in the form that explains the most, the system's own first."""
+    best: Comparer | None = None
+    for form in forms.fitting({name: item.shape for name, item in written.items()}):
+        subject = form.subject(_states(form.reference, written, given))
+        found = _in_one_form(subject, written, forms.stated.signs, strict)
+        # Global axes in some constraints alone are a slip, and no way to write.
+        is_whole = not found.wrong_count or not form.reference.is_global
+        if best is None or (is_whole and found.wrong_count < best.wrong_count):
+            best = found
+        if not best.wrong_count:
+            break
+    assert best is not None, "shapes are checked before"
+    return best
+
+
+def _in_one_form(
+    subject: Subject, written: Mapping[str, Written], signs: Mapping[str, float], strict: bool
+) -> Comparer:
+    """Compare at the given states, and where something differs at others that may explain it."""
+    best = Comparer(subject, written, signs, strict)
+    for states, convention in best.other_states():
+        other = Comparer(replace(subject, states=states), written, signs, strict, convention)
+        if other.wrong_count < best.wrong_count:
+            best = other
+    return best
+
+
+def _of_loads(subject: Subject, written: Mapping[str, Written], strict: bool) -> Report:
+    """Compare M and Q; where numbers may stand for parameters, at their default values too."""
+    reference, states = subject.reference, subject.states
+    best, conventions = LoadComparer(reference, written, states, strict), []
+    if best.wrong_count and states is reference.random and reference.defaults.size:
+        fixed = states.with_default_parameters(reference.defaults)
+        other = LoadComparer(reference, written, fixed, strict)
+        if other.wrong_count < best.wrong_count:
+            best, conventions = other, [NUMBERS]
+    right = Verdict.CONVENTION if conventions else Verdict.EQUAL
+    entries = tuple(best.entries(right))
+    return Report(reference.system.name, None, entries, tuple(conventions))
+
+
+def _read(
+    forms: Forms,
+    given: Mapping[str, object],
+    aliases: Mapping[str, object],
+    at_states: bool = False,
+) -> dict[str, Written]:
+    """Read all quantities, or raise all problems at once."""
+    given = {name: value for name, value in given.items() if value is not None}
+    if not given:
+        raise InputError(f"there is nothing to compare: give at least one of {listed(COMPARED)}.")
+    if any(name in OF_LOADS for name in given):
+        _require_loads(forms)
+    words = vocabulary(forms.reference, aliases)
+    written: dict[str, Written] = {}
+    problems: list[str] = []
+    for name, value in given.items():
+        check = partial(forms.shape_problems, name)
+        try:
+            written[name] = read_written(name, value, words, forms.reference, at_states, check)
+            problems += check(*written[name].shape)
+        except InputError as error:
+            problems += [item for item in error.problems if item != TOLD]
+    if problems:
+        raise InputError(problems)
+    return written
+
+
+def _require_loads(forms: Forms) -> None:
+    """Refuse M and Q of a mechanism that has none, and of one constraint."""
+    if forms.constraint is not None:
+        raise InputError(
+            f"M and Q are those of the whole system, not of {forms.constraint!r}: leave "
+            "constraint out."
+        )
+    system = forms.reference.system
+    if not system.loads:
+        raise InputError(
+            f"{system.name} has no masses and no forces, so that M and Q are zero: give "
+            "its bodies masses, m.body(..., mass=..., inertia=...), or add loads."
+        )

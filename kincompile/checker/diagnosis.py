@@ -1,0 +1,276 @@
+"""Explanations of entries that differ: a look-up in the catalogue of faults, by numbers.
+
+A fault explains a set of entries if it gives the author's numbers in each of them. One fault that
+explains all the entries of a constraint that differ comes first; then faults that explain some.
+Explanations that give the same numbers are equivalent, and are all named.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.checker.agreement import ABSOLUTE, ROUNDING, Given, finite
+from kincompile.checker.comparison import Diagnosis
+from kincompile.checker.entry_faults import entry_faults
+from kincompile.checker.fault import OMISSIONS, TERM_SIGN, Fault, Kind
+from kincompile.checker.forms import known_forms
+from kincompile.checker.joint_faults import PARTS_OF_GAMMA, Index, JointFaults, NumericFault
+from kincompile.checker.reference import Subject
+from kincompile.checker.states import Array
+from kincompile.derive.equations import derive_equation
+from kincompile.model.resolve import FreeEquation, Joint
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from kincompile.checker.forms import Form
+    from kincompile.checker.reference import ConstraintBlock, Reference
+    from kincompile.checker.states import States
+
+CLOSE = 1e-8
+"""Relative; wider than for equality, so that the fault named is not missed by rounding."""
+ROUNDED = 3e-3
+"""Relative difference up to which a constant was perhaps rounded to three digits."""
+MOST_NAMED = 6
+
+ROUNDED_NUMBER = "rounded number"
+NOT_DEFINED = "not defined"
+FEW_DIGITS, CANCEL = "too few digits", "terms that cancel"
+_NOT_DEFINED = Diagnosis(
+    NOT_DEFINED,
+    "it has no finite value at some states where the right one has: it divides by zero, or "
+    "takes a root or logarithm of a negative number",
+)
+
+
+Shown = tuple[Array, Array]
+"""Values of an entry and what rounding may have taken from them, (N,) each."""
+
+
+def undecided_diagnosis(given: Given) -> Diagnosis:
+    """Return why it cannot be decided whether an entry, (N,), is right, and what to do."""
+    if np.max(finite(given.typed + given.printed)) > np.max(ROUNDING * finite(given.sizes)):
+        text = (
+            "it cannot be decided: half of the last digit of its numbers is too much beside the "
+            "entry. Write more digits, or a formula."
+        )
+        return Diagnosis(FEW_DIGITS, text)
+    text = (
+        "it cannot be decided: terms that cancel are so large that their rounding hides the rest. "
+        "Write the entry without them."
+    )
+    return Diagnosis(CANCEL, text)
+
+
+class Diagnostician:
+    """Explains differences in the formulas of one system; keeps the catalogues that it has made."""
+
+    def __init__(self, reference: Reference, states: States) -> None:
+        self._reference = reference
+        self._states = states
+        self._catalogues: dict[tuple[tuple[int, ...], str, Form | None], list[NumericFault]] = {}
+        self._entries: dict[tuple[str, Index, Form | None], list[NumericFault]] = {}
+        self._generated = reference.values(states)
+
+    def explain(
+        self,
+        block: ConstraintBlock,
+        quantity: str,
+        written: Mapping[Index, Shown],
+        form: Form | None,
+    ) -> dict[Index, tuple[Diagnosis, ...]]:
+        """Return the explanations of every entry of a constraint that differs.
+
+        Parameters
+        ----------
+        written
+            By row and column of the system, with the author's conventions taken out: comparable to
+            the generated values as they are.
+        form
+            The form in which its author has it, None where it is written as generated.
+        """
+        left = {place: item for place, item in written.items() if np.isfinite(item[0]).all()}
+        found: dict[Index, tuple[Diagnosis, ...]] = {}
+        found |= dict.fromkeys(written.keys() - left.keys(), (_NOT_DEFINED,))
+        catalogue = self._catalogue(block, quantity, form)
+        found |= _explained(left, [fault for fault in catalogue if len(fault.result) > 1])
+        # One entry alone is looked at as it is typed first, in sines and cosines.
+        typed = [fault for place in left for fault in self._typed(quantity, place, form)]
+        catalogue = [*typed, *catalogue]
+        found |= _explained(left, catalogue)
+        for place, given in left.items():
+            right = self._right(quantity, form)[:, place[0], place[1]]
+            found[place] = _one_entry(place, given, right, catalogue)
+        return found
+
+    def is_one_fault(
+        self, block: ConstraintBlock, written: Mapping[Index, Shown], form: Form | None
+    ) -> bool:
+        """Return whether a single fault in vectors explains entries of Phi_q; see `explain`.
+
+        The sign of a whole row is none: that is a way to write it.
+        """
+        return any(
+            fault.kind != Kind.SIGN and len(fault.result) == len(written) and _fits(fault, written)
+            for fault in self._catalogue(block, "Phi_q", form)
+        )
+
+    def _catalogue(
+        self, block: ConstraintBlock, quantity: str, form: Form | None
+    ) -> list[NumericFault]:
+        """Return the faults in vectors of a constraint, by row and column of the system."""
+        joint = block.constraint if form is None else form.joint
+        key = (block.rows, quantity, form)
+        if key not in self._catalogues:
+            faults: Iterable[NumericFault] = ()
+            if isinstance(joint, Joint):
+                faults = self._faults_of(joint, block, quantity)
+            elif isinstance(joint, FreeEquation) and quantity == "gamma":
+                # Its three parts are by the coordinates.
+                is_by_q = self._reference.base is self._reference
+                faults = self._missing_in_equations(joint, block) if is_by_q else ()
+            self._catalogues[key] = [*faults, *self._other_forms(block, quantity, form)]
+        return self._catalogues[key]
+
+    def _faults_of(
+        self, joint: Joint, block: ConstraintBlock, quantity: str
+    ) -> Iterator[NumericFault]:
+        columns = [self._reference.columns.get(name or "") for name in joint.columns]
+        for fault in JointFaults(joint, quantity, self._reference, self._states).faults():
+            result = {
+                (block.rows[row], target): values
+                for (row, column), values in fault.result.items()
+                if (target := columns[column] if quantity == "Phi_q" else 0) is not None
+            }
+            if result:  # a fault in the columns of the ground alone does not show
+                yield replace(fault, result=result)
+
+    def _missing_in_equations(
+        self, equation: FreeEquation, block: ConstraintBlock
+    ) -> Iterator[NumericFault]:
+        for row, Phi in zip(block.rows, equation.expressions, strict=True):
+            terms = derive_equation(Phi, equation.columns).gamma_terms
+            values, _ = self._reference.evaluate(terms, self._states)
+            for k, (kind, text) in enumerate(PARTS_OF_GAMMA):
+                rest = np.delete(values, k, axis=1).sum(axis=1)
+                if np.any(values[:, k]) and np.any(rest):
+                    yield Fault(kind, text, {(row, 0): rest})
+
+    def _other_forms(
+        self, block: ConstraintBlock, quantity: str, form: Form | None
+    ) -> Iterator[NumericFault]:
+        """Yield the formulas that are right for another Phi than the author's."""
+        rows, right = list(block.rows), self._right(quantity, form)
+        others = []
+        if form is not None and form.defines:
+            others.append(("another form of the equation", self._right(quantity, None)[:, rows]))
+        if form is None:
+            subject = Subject(self._reference, block, self._states)
+            others += [
+                (item.text, item.evaluate(self._states)[quantity])
+                for item in known_forms(block, subject)
+            ]
+        for text, values in others:
+            result = {
+                (row, column): values[:, k, column]
+                for k, row in enumerate(rows)
+                for column in range(values.shape[-1])
+                if not _close(values[:, k, column], right[:, row, column])
+            }
+            if result and quantity != "Phi":
+                yield Fault(Kind.OTHER_FORM, f"it belongs to {text}, and not to your Phi", result)
+
+    def _right(self, quantity: str, form: Form | None) -> Array:
+        right = self._generated.of(quantity)
+        if form is not None:
+            right = right.copy()
+            right[:, list(form.rows)] = form.evaluate(self._states)[quantity]
+        return right
+
+    def _typed(self, quantity: str, place: Index, form: Form | None) -> list[NumericFault]:
+        key = (quantity, place, form)
+        if key not in self._entries:
+            reference, row = self._reference, place[0]
+            if form is not None and form.formulas is not None:
+                reference, row = form.formulas, form.rows.index(place[0])
+            faults = entry_faults(reference, quantity, row, place[1], self._states)
+            self._entries[key] = [
+                replace(fault, result={place: values})
+                for fault in faults
+                for values in fault.result.values()
+            ]
+        return self._entries[key]
+
+
+def _one_entry(
+    place: Index, given: Shown, right: Array, catalogue: Sequence[NumericFault]
+) -> tuple[Diagnosis, ...]:
+    """Explain an entry alone: by a fault that should show elsewhere too, or not at all."""
+    partly = _named(
+        fault
+        for fault in catalogue
+        if place in fault.result and _close(fault.result[place], *given)
+    )
+    if partly:
+        return tuple(replace(item, text=f"{item.text} (in this entry alone)") for item in partly)
+    size, off = np.max(np.abs(right)), np.max(np.abs(given[0] - right))
+    if size > ABSOLUTE and off <= ROUNDED * size:
+        text = (
+            f"it is right to {off / size:.1e} of its size: a number was rounded; write more "
+            "digits, or a formula"
+        )
+        return (Diagnosis(ROUNDED_NUMBER, text),)
+    return ()
+
+
+def _explained(
+    left: dict[Index, Shown], catalogue: Sequence[NumericFault]
+) -> dict[Index, tuple[Diagnosis, ...]]:
+    """Take out the entries that faults explain, those first that explain the most."""
+    found: dict[Index, tuple[Diagnosis, ...]] = {}
+    while fitting := [fault for fault in catalogue if _fits(fault, left)]:
+        places = max(fitting, key=lambda fault: len(fault.result)).result.keys()
+        named = _named(fault for fault in fitting if fault.result.keys() == places)
+        for place in places:
+            del left[place]
+            found[place] = named
+    return found
+
+
+def _fits(fault: NumericFault, left: Mapping[Index, Shown]) -> bool:
+    """Return whether a fault shows in entries that differ only, with the author's numbers."""
+    return all(
+        place in left and _close(values, *left[place]) for place, values in fault.result.items()
+    )
+
+
+def _close(one: Array, other: Array, lost: Array | float = 0.0) -> bool:
+    size = np.maximum(np.max(np.abs(one)), np.max(np.abs(other)))
+    return bool(np.all(np.abs(one - other) <= CLOSE * size + ABSOLUTE + lost))
+
+
+def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:
+    """Return one diagnosis for each kind of fault, the first of its kind."""
+    faults = list(faults)
+    by_kind: dict[str, NumericFault] = {}
+    for fault in faults:
+        by_kind.setdefault(fault.kind, fault)
+    if Kind.LEFT_ZERO in by_kind and not any(map(np.any, by_kind[Kind.LEFT_ZERO].result.values())):
+        # Zero was written. That a missing term would also give zero is no further explanation.
+        by_kind = {Kind.LEFT_ZERO: by_kind[Kind.LEFT_ZERO]}
+    if Kind.MISSING_TERM in by_kind and OMISSIONS.intersection(by_kind):
+        # Last: it says less of the same.
+        by_kind[Kind.MISSING_TERM] = by_kind.pop(Kind.MISSING_TERM)
+    signs = [fault for fault in faults if fault.kind == Kind.SIGN]
+    if Kind.TRANSPOSED in by_kind and [fault.text for fault in signs] == [TERM_SIGN]:
+        # What a transposed rotation is in one entry: told in one sentence.
+        cause, shown = by_kind[Kind.TRANSPOSED], by_kind.pop(Kind.SIGN)
+        text = f"{shown.text}, as where {cause.text}"
+        by_kind[Kind.TRANSPOSED] = replace(cause, text=text, detail=shown.detail)
+    return tuple(
+        Diagnosis(fault.kind, f"{fault.text}.", fault.detail)
+        for fault in list(by_kind.values())[:MOST_NAMED]
+    )

@@ -1,0 +1,111 @@
+"""Faults in an entry written out in sines and cosines, as one types it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy
+
+from kincompile.checker.agreement import is_alike
+from kincompile.checker.fault import A_TERM, Fault, Kind, term_faults, whole_faults
+from kincompile.names import rate
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from kincompile.checker.reference import Reference
+    from kincompile.checker.states import Array, States
+
+MOST_TERMS = 80
+"""Longer entries are not taken apart: one term in so many is no longer recognisable."""
+MOST_EXPANDED = 1000
+"""Terms up to which an entry is multiplied out; like ones are among them, and join."""
+
+
+def entry_faults(
+    reference: Reference, quantity: str, row: int, column: int, states: States
+) -> Iterator[Fault[Mapping[tuple[int, int], Array]]]:
+    """Yield the faults of one entry; they show there and nowhere else."""
+    entry = reference.expression(quantity, row, column)
+    if _count(entry) <= MOST_EXPANDED:
+        entry = sympy.expand(entry)
+    printed = reference.printed(entry)
+    angles = [
+        sympy.Symbol(name)
+        for name, is_angle in zip(reference.coordinates, reference.angular, strict=True)
+        if is_angle
+    ]
+    faults = [*whole_faults(quantity, "the entry", lambda factor: factor * entry, printed)]
+    text = "sine and cosine are swapped throughout"
+    faults.append(Fault(Kind.SINE_COSINE, text, _sine_cosine(entry), printed))
+    terms = sympy.Add.make_args(entry)
+    parts = [entry, *terms] if len(terms) <= MOST_TERMS else [entry]
+    replaced = [0] * len(faults)  # number of the part in whose place the result stands
+    for k, term in enumerate(parts[1:], 1):
+        found = list(_faults_of_term(term, angles))
+        faults += found
+        replaced += [k] * len(found)
+    # Sums are taken of numbers: SymPy would sort the terms of each.
+    results = [fault.result for fault in faults]
+    values, sizes = (item[..., None] for item in reference.evaluate([*parts, *results], states))
+    right, wrong = values[:, :1], values[:, :1] - values[:, replaced] + values[:, len(parts) :]
+    sizes = sizes[:, :1] + np.abs(values[:, replaced]) + sizes[:, len(parts) :]
+    equal = np.all(is_alike(wrong, right, sizes), axis=(0, 2))
+    for k, fault in enumerate(faults):
+        if not equal[k]:
+            yield replace(fault, result={(row, column): wrong[:, k, 0]})
+
+
+def _count(expression: Any) -> int:
+    """Return of how many terms an expression is when its products are multiplied out, at most."""
+    if expression.is_Add:
+        return sum(map(_count, expression.args))
+    if expression.is_Mul:
+        return prod(map(_count, expression.args))
+    base, exponent = expression.as_base_exp()
+    return _count(base) ** int(exponent) if exponent.is_Integer and exponent > 1 else 1
+
+
+def _faults_of_term(
+    term: sympy.Expr, angles: Sequence[sympy.Symbol]
+) -> Iterator[Fault[sympy.Expr]]:
+    """Yield the faults of a term; the result stands in its place."""
+    full = str(term)
+    yield from term_faults(A_TERM, lambda factor: factor * term, full)
+    functions = sorted(term.atoms(sympy.sin, sympy.cos), key=str)
+    yield Fault(Kind.SINE_COSINE, "sine and cosine are swapped in a term", _sine_cosine(term), full)
+    for function in functions if len(functions) > 1 else ():
+        text = f"sine and cosine of {function.args[0]} are swapped in a term"
+        swapped = term.xreplace({function: _sine_cosine(function)})
+        yield Fault(Kind.SINE_COSINE, text, swapped, full)
+    for angle in angles:
+        for other in angles if term.has(angle) else ():
+            if other != angle:
+                text = f"{other} stands where {angle} belongs, in a term"
+                mixed = {item: item.xreplace({angle: other}) for item in functions}
+                yield Fault(Kind.MIXED_ANGLES, text, term.xreplace(mixed), full)
+    yield from _missing_factors(term, full)
+
+
+def _sine_cosine(expression: sympy.Expr) -> sympy.Expr:
+    other = {sympy.sin: sympy.cos, sympy.cos: sympy.sin}
+    found = expression.atoms(sympy.sin, sympy.cos)
+    swapped: sympy.Expr = expression.xreplace({f: other[f.func](*f.args) for f in found})
+    return swapped
+
+
+def _missing_factors(term: sympy.Expr, full: str) -> Iterator[Fault[sympy.Expr]]:
+    number, _ = term.as_coeff_Mul()
+    if abs(number) not in (0, 1, 2):
+        text = "a constant factor of a term is missing"
+        yield Fault(Kind.MISSING_FACTOR, text, term / abs(number), full)
+    for factor in sympy.Mul.make_args(term):
+        base, exponent = factor.as_base_exp()
+        if isinstance(base, sympy.Symbol) and base.name.endswith(rate("")):
+            kind, text = Kind.MISSING_RATE, f"a factor {base} is missing in a term"
+            if exponent == 2:
+                kind, text = Kind.MISSING_SQUARE, f"{base} stands where {base}^2 belongs, in a term"
+            yield Fault(kind, text, term / base, full)

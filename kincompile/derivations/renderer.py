@@ -1,0 +1,100 @@
+"""What the media of a derivation share: sections, blocks and runs, printed in turn."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
+
+from kincompile.derivations.document import (
+    CrossReference,
+    Display,
+    Figure,
+    Math,
+    NotebookCode,
+    Pattern,
+    Table,
+    Text,
+    Verbatim,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from kincompile.derivations.document import Block, Chapter, Run, Runs
+    from kincompile.derivations.formulas import Formula
+    from kincompile.view.picture import Picture
+
+
+class Renderer(ABC):
+    """Prints sections line by line; a medium gives the methods below `run`."""
+
+    def section(self, section: Chapter, depth: int) -> Iterator[str]:
+        """Yield the lines of a section and its parts; `depth` counts from 0."""
+        yield from self.heading(section, depth)
+        for block in section.blocks:
+            yield from self.block(block)
+        for inner in section.sections:
+            yield from self.section(inner, depth + 1)
+
+    def block(self, block: Block) -> Iterable[str]:
+        """Return the lines of a block; only notebooks have code."""
+        match block:
+            case Text(runs):
+                return self._paragraph(self.runs(runs))
+            case Display():
+                return self._display(block)
+            case Table():
+                return self._table(block)
+            case Pattern():
+                return self._pattern(block)
+            case Figure(picture):
+                return self._figure(picture)
+            case NotebookCode():
+                return ()
+        raise TypeError(f"cannot print {block!r}")
+
+    def runs(self, runs: Runs) -> str:
+        """Return a text."""
+        return "".join(map(self.run, runs))
+
+    def run(self, run: Run) -> str:
+        """Return a piece of a text."""
+        match run:
+            case Verbatim(text):
+                return self._verbatim(text)
+            case Math(formula):
+                return self._math(formula)
+            case CrossReference():
+                return self._link(run)
+        return self._prose(run)
+
+    @abstractmethod
+    def heading(self, section: Chapter, depth: int) -> Iterator[str]:
+        """Yield the title of a section."""
+
+    @abstractmethod
+    def _paragraph(self, text: str) -> Iterable[str]: ...
+
+    @abstractmethod
+    def _display(self, block: Display) -> Iterator[str]: ...
+
+    @abstractmethod
+    def _table(self, table: Table) -> Iterator[str]: ...
+
+    @abstractmethod
+    def _pattern(self, pattern: Pattern) -> Iterator[str]: ...
+
+    @abstractmethod
+    def _figure(self, picture: Picture) -> Iterable[str]: ...
+
+    @abstractmethod
+    def _verbatim(self, text: str) -> str: ...
+
+    @abstractmethod
+    def _math(self, formula: Formula) -> str: ...
+
+    @abstractmethod
+    def _link(self, link: CrossReference) -> str: ...
+
+    @abstractmethod
+    def _prose(self, text: str) -> str: ...

@@ -1,0 +1,51 @@
+"""A picture as SVG: an element of a page, or an image of its own."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from typing import TYPE_CHECKING
+
+from kincompile.derivations.mathml import index_text, letter_text
+from kincompile.derivations.notation import has_prime, split_name
+from kincompile.view.picture import svg_element
+
+if TYPE_CHECKING:
+    from kincompile.view.picture import Picture, PictureLabel
+
+FONT = "'Kincompile Math','Latin Modern Math','STIX Two Math','Cambria Math',serif"
+"""Fonts of labels; the first is that of the page."""
+
+SIZE = 15
+"""Height of labels [points]."""
+
+
+def as_svg(picture: Picture) -> str:
+    """Return a picture with its labels as an `svg` element of a page."""
+    return svg_element(picture, "".join(_label(item, picture.height) for item in picture.labels))
+
+
+def standalone_svg(picture: Picture) -> str:
+    """Return a picture with its labels as the text of an image."""
+    return as_svg(picture).replace("<svg", '<svg xmlns="http://www.w3.org/2000/svg"', 1)
+
+
+def svg_address(picture: Picture) -> str:
+    """Return a picture as the address of an image, which holds it."""
+    svg = standalone_svg(picture)
+    return f"data:image/svg+xml;base64,{b64encode(svg.encode()).decode()}"
+
+
+def _label(label: PictureLabel, height: float) -> str:
+    letter, index, _ = split_name(label.name)
+    prime = "\N{PRIME}" if not label.is_vector or has_prime(letter, index) else ""
+    below = f'<tspan dy="4" font-size="{0.7 * SIZE:g}">{index_text(index)}</tspan>' if index else ""
+    above = f'<tspan dy="{-4 if index else 0}">{prime}</tspan>' if prime else ""
+    if label.name in ("x", "y", "z"):  # of the ground
+        above = ""
+    text = letter_text(letter, bold=label.is_vector)
+    return (
+        f'<text x="{label.x:.1f}" y="{height - label.y + SIZE / 3:.1f}" font-size="{SIZE}" '
+        f'font-family="{FONT}" text-anchor="middle" fill="{label.colour}" '
+        f'paint-order="stroke" stroke="#fff" stroke-opacity=".7" stroke-width="3">'
+        f"{text}{below}{above}</text>"
+    )

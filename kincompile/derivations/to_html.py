@@ -1,0 +1,165 @@
+"""A derivation as one self-contained HTML page: MathML and a style sheet, no script, no network."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+from kincompile.derivations.mathml import MathMLPrinter
+from kincompile.derivations.renderer import Renderer
+from kincompile.derivations.svg import as_svg
+from kincompile.emitters.templates import fill, read
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from kincompile.derivations.document import (
+        Chapter,
+        CrossReference,
+        Display,
+        Manuscript,
+        Pattern,
+        SourceLine,
+        Table,
+    )
+    from kincompile.derivations.formulas import Formula
+    from kincompile.view.picture import Picture
+
+DEEPEST_IN_CONTENTS = 2
+"""Depth of the list of contents, which leaves out the nine steps."""
+
+CELL = 18
+"""Side of a cell of a pattern [pixels]."""
+
+CHARACTER = 6.8
+"""Width of a character of a pattern's labels, in a monospaced font of 11 pixels."""
+
+
+def as_html(
+    document: Manuscript, title: str = "Derivation of", kind: str = "", after: str = ""
+) -> str:
+    """Return a document as an HTML page; the title stands before its name.
+
+    The kind is the class of the page's body: ``"slides"``, or none. What comes `after` the sections
+    is HTML: plots.
+    """
+    renderer = _HtmlRenderer(document)
+    data = {
+        "kind": kind,
+        "style": read("derivation/math.css") + read("derivation/page.css").rstrip(),
+        "title": escape(f"{title} {document.name}"),
+        "heading": f"{escape(title)} <code>{escape(document.name)}</code>",
+        "summary": escape(document.summary),
+        "contents": "\n".join(renderer.contents(document.sections)),
+        "main": "\n".join(
+            [*(line for item in document.sections for line in renderer.section(item, 0)), after]
+        ),
+    }
+    return fill("derivation/page.html.jinja", data)
+
+
+class _HtmlRenderer(Renderer):
+    def __init__(self, document: Manuscript) -> None:
+        self._printer = MathMLPrinter(document.abbreviations)
+
+    def contents(self, sections: tuple[Chapter, ...], depth: int = 1) -> Iterator[str]:
+        yield "<ol>"
+        for item in sections:
+            yield f'<li><a href="#{escape(item.anchor)}">{self.runs(item.title)}</a>'
+            if depth < DEEPEST_IN_CONTENTS and item.sections:
+                yield from self.contents(item.sections, depth + 1)
+            yield "</li>"
+        yield "</ol>"
+
+    def section(self, section: Chapter, depth: int) -> Iterator[str]:
+        yield from super().section(section, depth)
+        yield "</details></section>" if section.is_folded else "</section>"
+
+    def heading(self, section: Chapter, depth: int) -> Iterator[str]:
+        level = f'<span class="level {section.level}">{section.level}</span>'
+        title = self.runs(section.title) + (level if section.level else "")
+        heading = f"<h{depth + 2}>{title}</h{depth + 2}>"
+        yield f'<section id="{escape(section.anchor)}">'
+        yield f"<details><summary>{heading}</summary>" if section.is_folded else heading
+
+    def _paragraph(self, text: str) -> Iterator[str]:
+        yield f"<p>{text}</p>"
+
+    def _display(self, block: Display) -> Iterator[str]:
+        anchor = f' id="{escape(block.anchor)}"' if block.anchor else ""
+        yield f'<div class="eq wide"{anchor}>{self._printer.display(block.formula)}</div>'
+        if block.source is not None:
+            yield _source(block.source)
+
+    def _table(self, table: Table) -> Iterator[str]:
+        if table.folded:
+            yield f"<details><summary>{escape(table.folded)}</summary>"
+        header = "".join(f"<th>{self.runs(cell)}</th>" for cell in table.header)
+        yield '<div class="wide"><table>'
+        yield f"<thead><tr>{header}</tr></thead><tbody>"
+        for row in table.rows:
+            yield f"<tr>{''.join(f'<td>{self.runs(cell)}</td>' for cell in row)}</tr>"
+        yield "</tbody></table></div>"
+        if table.folded:
+            yield "</details>"
+
+    def _pattern(self, pattern: Pattern) -> Iterator[str]:
+        yield from ('<div class="wide">', _pattern_svg(pattern), "</div>")
+
+    def _figure(self, picture: Picture) -> Iterator[str]:
+        yield f"<figure>{as_svg(picture)}</figure>"
+
+    def _verbatim(self, text: str) -> str:
+        return f"<code>{escape(text)}</code>"
+
+    def _math(self, formula: Formula) -> str:
+        return self._printer.math(formula)
+
+    def _link(self, link: CrossReference) -> str:
+        return f'<a href="#{escape(link.anchor)}">{self.run(link.content)}</a>'
+
+    def _prose(self, text: str) -> str:
+        return escape(text)
+
+
+def _source(source: SourceLine) -> str:
+    *before, last = source.text.split("\n")
+    shown = f"line {source.number}: <code>{escape(last)}</code>"
+    if not before:
+        return f'<p class="src">{shown}</p>'
+    code = escape("\n".join(before))
+    return f'<details class="src"><summary>{shown}</summary><pre>{code}</pre></details>'
+
+
+def _pattern_svg(pattern: Pattern) -> str:
+    """Return a picture; a filled square is an entry that can differ from zero, and a link."""
+    left = 10 + CHARACTER * max(map(len, pattern.rows), default=0)
+    top = 10 + CHARACTER * max(map(len, pattern.columns), default=0)
+    length = CELL * len(pattern.columns)
+    width, height = left + length + 4, top + CELL * len(pattern.rows) + 4
+    parts = [
+        f'<svg class="pattern" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
+        f'height="{height:.0f}" role="img" aria-label="Pattern of the Jacobian">'
+    ]
+    parts += [
+        f'<rect class="band{k % 2}" x="{left:.0f}" y="{top + CELL * first:.0f}" '
+        f'width="{length}" height="{CELL * count}"/>'
+        for k, (first, count) in enumerate(pattern.bands)
+    ]
+    parts += [
+        f'<text x="{left - 5:.0f}" y="{top + CELL * (k + 0.72):.1f}" text-anchor="end">'
+        f"{escape(name)}</text>"
+        for k, name in enumerate(pattern.rows)
+    ]
+    parts += [
+        f'<text transform="translate({left + CELL * (k + 0.72):.1f} {top - 5:.0f}) rotate(-90)">'
+        f"{escape(name)}</text>"
+        for k, name in enumerate(pattern.columns)
+    ]
+    parts += [
+        f'<a href="#{escape(anchor)}"><rect class="entry" x="{left + CELL * column + 2:.0f}" '
+        f'y="{top + CELL * row + 2:.0f}" width="{CELL - 4}" height="{CELL - 4}"><title>'
+        f"{escape(pattern.rows[row])} by {escape(pattern.columns[column])}</title></rect></a>"
+        for (row, column), anchor in pattern.entries.items()
+    ]
+    return "".join([*parts, "</svg>"])

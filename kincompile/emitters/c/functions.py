@@ -1,0 +1,179 @@
+"""The functions of a program as C text: each works on one point of a strip of points."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from kincompile.emitters.c.dialect import C
+from kincompile.emitters.evaluators import frames_title
+from kincompile.emitters.headings import title
+from kincompile.emitters.planned_solve import explained
+from kincompile.emitters.printer import Printer
+from kincompile.emitters.solve_statements import factorization, operands, solution
+from kincompile.emitters.statements import Statements
+from kincompile.ir.graph import Graph
+from kincompile.quantities import quantity_named
+
+if TYPE_CHECKING:
+    from kincompile.emitters.evaluators import Listing
+    from kincompile.emitters.planned_solve import BlockCall, SolveListing
+    from kincompile.ir.inline import InlineProgram
+
+WRITE = Statements("//", "const double {}", "at->{}[{}][lane]", "")
+
+ABOUT = {
+    "position": "Phi and Phi_q in one go: a step of Newton's method.",
+    "kinematics": "Phi, Phi_q, nu and gamma in one go.",
+    "observe": "Outputs y, y_dot and y_ddot in one go.",
+    "forward_dynamics": "Accelerations and multipliers in one go.",
+}
+"""What the kernels of several quantities give."""
+
+ANGLE_FUNCTIONS = frozenset({"cos", "sin", "cos_sin"})
+"""Functions whose fast form does not reach all angles."""
+
+
+def evaluator(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+    """Return a function that evaluates quantities at a point, and the one for a strip."""
+    has_angles = not ANGLE_FUNCTIONS.isdisjoint(listing.functions)
+    body = ["int64_t far = 0;"] if has_angles else []
+    body += WRITE.inputs(code.program, listing)
+    body += ["const double t = at->t[lane];"] if "t" in listing.inputs else []
+    body += _frames(listing, printer) + WRITE.steps(listing, printer)
+    body += WRITE.computed(code, listing, printer)
+    write = _with_angles if has_angles else _plain
+    return [f"// {ABOUT.get(name) or quantity_named(name).about}", *write(name, body)]
+
+
+def _plain(name: str, body: list[str]) -> list[str]:
+    # A function of a whole point that is constant, or has no entry that varies, is possible.
+    used = any("[lane]" in line for line in body)
+    return [
+        f"_always_inline void {name}_at(strip *at, size_t lane)",
+        "{",
+        *(f"    {line}" for line in (body if used else ["(void)at, (void)lane;"])),
+        "}",
+        "",
+        *_strip_function(name),
+    ]
+
+
+def _with_angles(name: str, body: list[str]) -> list[str]:
+    return [
+        f"_always_inline int64_t {name}_at(strip *at, size_t lane, int exact)",
+        "{",
+        *(f"    {line}" for line in (*body, "return far;")),
+        "}",
+        "",
+        f"static void {name}_of_strip(strip *at, size_t count)",
+        "{",
+        "    int64_t far = 0;",
+        "    for (size_t lane = 0; lane < count; lane++)",
+        f"        far |= {name}_at(at, lane, 0);",
+        "    for (size_t lane = 0; far && lane < count; lane++)",
+        f"        {name}_at(at, lane, 1);",
+        "}",
+    ]
+
+
+def _strip_function(name: str) -> list[str]:
+    return [
+        f"static void {name}_of_strip(strip *at, size_t count)",
+        "{",
+        "    for (size_t lane = 0; lane < count; lane++)",
+        f"        {name}_at(at, lane);",
+        "}",
+    ]
+
+
+def _frames(listing: Listing, printer: Printer) -> list[str]:
+    """Return the cosine and sine of each body's angle, a line a body."""
+    lines = [f"// {title}" for title in frames_title(listing.frames)]
+    for frame in listing.frames:
+        if frame.angle is not None:
+            c, s = (item.name for item in frame.values)
+            angle = printer.text(frame.angle)
+            lines += [f"double {c}, {s};", f"far |= cos_sin({angle}, exact, &{c}, &{s});"]
+        else:
+            lines += [
+                f"const double {item.name} = {printer.definition(item.node)};"
+                for item in frame.values
+            ]
+    return lines
+
+
+def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
+    """Return the functions that factor Phi_q and that solve Phi_q x = right at a point."""
+    printer = Printer(C, listing.plan.nodes, listing.names)
+    body = solution(replace(WRITE, element="{}[{}][lane]"), listing, printer, _block_call)
+    return [
+        "// What a solve needs of Phi_q, and the determinants of its blocks.",
+        *(f"// {line}" for line in explained(code, listing.plan)),
+        *_plain("factor", factorization(WRITE, code, listing, printer, _block_call)),
+        "",
+        "// x of Phi_q x = right.",
+        "_always_inline void solve_at(double (*restrict F)[LANES],",
+        "    double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)",
+        "{",
+        *(f"    {line}" for line in (body if listing.factors else ["(void)F;", *body])),
+        "}",
+        "",
+        "// What rates miss of Phi_q q_dot = nu and Phi_q q_ddot = gamma: sums of squares.",
+        "_always_inline void missed_at(const strip *at, const double (*weight)[LANES],",
+        "    double *by_velocity, double *by_acceleration, size_t lane)",
+        "{",
+        "    double velocity = 0, acceleration = 0, rest;",
+        *(f"    {line}" for line in _missed(code)),
+        "    *by_velocity = velocity;",
+        "    *by_acceleration = acceleration;",
+        "}",
+    ]
+
+
+def _missed(code: InlineProgram) -> list[str]:
+    """Return the statements that add up what rates miss of each equation."""
+    graph, names = Graph(), dict[int, str]()
+    printer, places = Printer(C, graph.nodes, names), {x: k for k, x in enumerate(code.pattern())}
+
+    def element(vector: str, k: int, entry: int | None = None) -> int:
+        number = None if entry is None else code.number(entry)
+        node = graph.input((vector, k)) if number is None else graph.const(number)
+        if number is None:
+            names[node] = WRITE.element.format(vector, k)
+        return node
+
+    lines = []
+    for section in code.constraints:
+        lines.append(f"// {title(section)}")
+        for total, rate, right in (
+            ("velocity", "q_dot", "nu"),
+            ("acceleration", "q_ddot", "gamma"),
+        ):
+            missed = {x.row: element(right, x.row, x.node) for x in section.entries[right]}
+            for x in section.entries["Phi_q"]:
+                entry = element("Phi_q", places[x.row, x.column], x.node)
+                term = graph.mul(entry, element(rate, x.column))
+                missed[x.row] = graph.sub(missed[x.row], term)
+            for row, node in missed.items():
+                lines += WRITE.assigned("rest", printer.text(node))
+                lines.append(f"{total} += weight[{row}][lane] * rest * rest;")
+    return lines
+
+
+def _block_call(step: BlockCall, printer: Printer) -> list[str]:
+    """Return the call that solves a block, with the names of the unknowns, or its determinant."""
+    matrix = operands(step.matrix, printer)
+    if not step.right:
+        left = WRITE.value.format(step.names[0])
+        return [f"{left} = block_determinant({step.size}, (const double[]){{", *matrix, "});"]
+    vector = f"block_of_{step.names[0]}"
+    return [
+        f"double {vector}[{step.size}];",
+        f"block_solve({step.size}, (const double[]){{",
+        *matrix,
+        "}, (const double[]){",
+        *operands(step.right, printer),
+        f"}}, {vector});",
+        *(f"const double {name} = {vector}[{k}];" for k, name in enumerate(step.names)),
+    ]

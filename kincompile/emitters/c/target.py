@@ -1,0 +1,293 @@
+"""The C target: one .c and one .h file that need a C99 compiler and nothing else."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from kincompile import criteria, quantities
+from kincompile.emitters.c.dialect import C
+from kincompile.emitters.c.functions import WRITE, evaluator, solve_functions
+from kincompile.emitters.c.march import CSolver
+from kincompile.emitters.lines import WIDTH, indented, wrapped
+from kincompile.emitters.planned_solve import schedule_solve
+from kincompile.emitters.printer import ELEMENTARY
+from kincompile.emitters.templates import fill
+from kincompile.quantities import nonzeros_of
+from kincompile.solver.reader import solver
+from kincompile.solver.vocabulary import COUNTS, CRITERIA
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+
+    from kincompile.emitters.evaluators import Listing
+    from kincompile.emitters.planned_solve import SolveListing
+    from kincompile.emitters.printer import Printer
+    from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.program import Program
+    from kincompile.quantities import Quantity
+
+DIALECT = C
+
+LANES = 32
+"""Points in a strip: enough for the widest registers, few enough for the nearest cache."""
+
+KEYWORDS = (
+    "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else",
+    "enum", "extern", "float", "for", "goto", "if", "inline", "int", "long", "register",
+    "restrict", "return", "short", "signed", "sizeof", "static", "struct", "switch", "typedef",
+    "union", "unsigned", "void", "volatile", "while", "asm", "typeof", "bool",
+    "true", "false", "nullptr", "constexpr", "alignas", "alignof", "static_assert", "thread_local",
+    "linux", "unix", "NULL", "NAN", "INFINITY", "HUGE_VAL", "M_E", "M_PI",
+    "HUGE_VALF", "HUGE_VALL", "MATH_ERRNO", "MATH_ERREXCEPT", "math_errhandling", "FP_NAN",
+    "FP_INFINITE", "FP_ZERO", "FP_SUBNORMAL", "FP_NORMAL", "FP_ILOGB0", "FP_ILOGBNAN", "SIZE_MAX",
+    *(f"{x}_{end}" for x in ("PTRDIFF", "SIG_ATOMIC", "WCHAR", "WINT", "INTPTR", "INTMAX")
+      for end in ("MIN", "MAX")),
+    *(f"{sign}INT{kind}{bits}_{end}" for sign in ("", "U") for kind in ("", "_LEAST", "_FAST")
+      for bits in (8, 16, 32, 64) for end in ("MIN", "MAX")),
+    "UINTPTR_MAX", "UINTMAX_MAX", "EXIT_SUCCESS", "EXIT_FAILURE", "RAND_MAX", "MB_CUR_MAX",
+)  # fmt: skip
+"""Words of C and of later standards, and macros of headers and compilers. Our own begin with an
+underscore, as no name of a user does."""
+
+RESERVED: tuple[str, ...] = (
+    *KEYWORDS, "at", "lane", "t", "far", "exact", "F", "right", "to",
+    "square", "angle_of", "cos_sin", "cosine", "sine", "spline", "block_solve", "block_determinant",
+    "fabs", "fmax", *ELEMENTARY,
+)  # fmt: skip
+"""Names that the functions of a mechanism use."""
+
+
+evaluators = quantities.kernels
+"""The kernels."""
+
+
+def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+    """Return the lines of a function of a point, and of the one for a strip of points."""
+    return ["", *evaluator(name, code, listing, printer)]
+
+
+def files(
+    code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
+) -> Mapping[str, str]:
+    """Return the source and the header."""
+    program, listing = code.program, schedule_solve(code, RESERVED)
+    about = _about(code, listing)
+    lines = [line for own in functions.values() for line in own]
+    body = [_strip(code, lines, called, listing)]
+    body.append(fill("c/batch.c.jinja", {**_only(about, "name", "is_planned"), **_batch(code)}))
+    if listing is not None:
+        body.append(fill("c/march.c.jinja", {"name": program.name, **_scales(program)}))
+    data = {**_without(about, "NAME"), **_tables(code, listing), "body": "".join(body)}
+    source = fill("c/module.c.jinja", data)
+    guard = f"{program.name.upper()}_H"
+    head = fill("c/module.h.jinja", {**about, "guard": guard, "outputs": indented(_outputs(code))})
+    return {f"{program.name}.c": source, f"{program.name}.h": head}
+
+
+def _about(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]:
+    """Return what source and header both say."""
+    program = code.program
+    return {
+        "name": program.name,
+        "NAME": program.name.upper(),
+        "header": WRITE.heading(code),
+        "n": len(program.coordinates),
+        "m": len(program.equations),
+        "k": len(program.parameters),
+        "nonzeros": len(code.pattern()),
+        "is_planned": listing is not None,
+    }
+
+
+def _only(data: dict[str, Any], *keys: str) -> dict[str, Any]:
+    return {key: data[key] for key in keys}
+
+
+def _without(data: dict[str, Any], *keys: str) -> dict[str, Any]:
+    return {key: value for key, value in data.items() if key not in keys}
+
+
+def _tables(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]:
+    """Return the constants of the source file: names, numbers and the patterns of matrices."""
+    program = code.program
+    patterns, entries = [], []
+    for quantity in program.quantities:
+        values = [code.number(entry.node) for entry in code.entries(quantity.name)]
+        numbers = [f"{{{k}, {float(x)!r}}}" for k, x in enumerate(values) if x is not None]
+        computed = [str(k) for k, value in enumerate(values) if value is None]
+        if quantity.is_matrix:
+            places = [f"{{{row}, {column}}}" for row, column in code.pattern(quantity.name)]
+            kind = "const int" if quantity.name == "Phi_q" else "static const int"
+            patterns.append(_array(f"{kind} {_pattern_name(code, quantity)}[][2]", places))
+        entries += [
+            _array(f"static const constant {quantity.name}_constant[]", numbers, "{0, 0.0}"),
+            _array(f"static const int {quantity.name}_computed[]", computed),
+        ]
+        if quantity.is_matrix:
+            width = program.shape_of(quantity)[1]
+            flat = [str(row * width + column) for row, column in code.pattern(quantity.name)]
+            own = [flat[int(k)] for k in computed]
+            entries.append(_array(f"static const int {quantity.name}_place[]", own))
+    return {
+        "patterns": "\n".join(patterns),
+        "entries": "\n".join(entries),
+        "numbers": sum(len(code.entries(item.name)) for item in program.quantities),
+        "lanes": LANES,
+        "n_factors": 0 if listing is None else len(listing.factors),
+        "n_blocks": 0 if listing is None else len(listing.plan.determinants),
+        "fingerprint": program.fingerprint,
+        "defaults": _array_lines([repr(item.default) for item in program.parameters]),
+        "guess": _array_lines([repr(item.guess) for item in program.coordinates]),
+    }
+
+
+def _pattern_name(code: InlineProgram, quantity: Quantity) -> str:
+    return (
+        f"{code.program.name}_pattern" if quantity.name == "Phi_q" else f"{quantity.name}_pattern"
+    )
+
+
+def _array(declaration: str, items: Sequence[str], placeholder: str = "0") -> str:
+    lines = _array_lines(items, placeholder)
+    short = f"{declaration} = {{ {lines.strip().rstrip(',')} }};"
+    return (
+        short if "\n" not in lines and len(short) <= WIDTH else f"{declaration} = {{\n{lines}\n}};"
+    )
+
+
+def _batch(code: InlineProgram) -> dict[str, Any]:
+    """Return the tables of quantities and kernels by which a batch is evaluated."""
+    program, rows, matrices = code.program, [], 0
+    for quantity in program.quantities:
+        height, width = (*program.shape_of(quantity), 0)[:2]
+        entries, name = code.entries(quantity.name), quantity.name
+        constants = sum(code.number(entry.node) is not None for entry in entries)
+        nonzeros = f"offsetof({program.name}_batch, {nonzeros_of(quantity)})"
+        rows += [
+            f"{{offsetof(strip, {name}), offsetof({program.name}_batch, {name}),",
+            f"    {nonzeros if quantity.is_matrix else 0}, {height}, {width}, {matrices},",
+            f"    {len(entries)}, {constants}, {len(entries) - constants},",
+            f"    {_pattern_name(code, quantity) if quantity.is_matrix else 'NULL'},",
+            f"    {name}_constant, {name}_computed, {f'{name}_place' if width else 'NULL'}}},",
+        ]
+        matrices += height * width
+    bits = {item.name: 1 << k for k, item in enumerate(program.quantities)}
+    kernels = quantities.kernels(program.quantities)
+    return {
+        "quantities": indented(rows),
+        "n_quantities": len(bits),
+        "writes": indented(
+            line
+            for k, bit in enumerate(bits.values())
+            for line in (
+                f"    if (wanted & {bit})",
+                f"        write_quantity(batch, &QUANTITY[{k}], &b, matrices, start, count,",
+                "            is_far);",
+            )
+        ),
+        "matrices": max(matrices, 1),
+        "kernels": indented(
+            f"{{{sum(bits[item] for item in given)}, {name}_of_strip}},"
+            for name, given in kernels.items()
+        ),
+        "n_kernels": len(kernels),
+        **{
+            f"reads_{state}": sum(
+                bits[item.name] for item in program.quantities if state in item.reads
+            )
+            for state in ("q_dot", "q_ddot")
+        },
+    }
+
+
+def _outputs(code: InlineProgram) -> list[str]:
+    """Return the results of a batch as the header declares them."""
+    program, lines = code.program, []
+    if program.observers:
+        lines.append(f"{program.name}_input q_ddot;  // second rates, of which outputs may depend")
+    for quantity in program.quantities:
+        size = " x ".join(map(str, program.shape_of(quantity)))
+        lines.append(f"{program.name}_output {quantity.name};  // {size}: {quantity.about}")
+        if quantity.is_matrix:
+            size = str(len(code.entries(quantity.name)))
+            about = f"{size} entries of {quantity.name}, in the order of the pattern"
+            lines.append(f"{program.name}_output {nonzeros_of(quantity)};  // {about}")
+    return lines
+
+
+def _array_lines(items: Sequence[str], placeholder: str = "0") -> str:
+    """Return the lines of an array; C has no empty ones."""
+    return "\n".join(f"    {line}" for line in wrapped(items or [placeholder]))
+
+
+def _strip(
+    code: InlineProgram, lines: list[str], called: Collection[str], listing: SolveListing | None
+) -> str:
+    """Return the functions that work on a strip of points, and what they need."""
+    largest = 0
+    if listing is not None:
+        lines = [*lines, "", *solve_functions(code, listing)]
+        sizes = (len(block.rows) for block in listing.plan.blocks)
+        largest = max((size for size in sizes if size > listing.plan.straight), default=0)
+    data = {
+        "is_planned": listing is not None,
+        "elementary": _elementary(code.program, called, largest),
+        "functions": "\n".join(lines),
+        "results": indented(
+            f"double {item.name}[{max(len(code.entries(item.name)), 1)}][LANES];"
+            for item in code.program.quantities
+        ),
+    }
+    return fill("c/strip.c.jinja", data)
+
+
+def _elementary(program: Program, called: Collection[str], largest: int) -> str:
+    """Return what the code calls: functions of angles, splines, the solve of blocks of a size."""
+    data = {
+        "alone": [long for short, long in (("cos", "cosine"), ("sin", "sine")) if short in called],
+        "tables": "\n\n".join(_splines(program)),
+        "has_angles": "atan2" in called,
+        "order": max(
+            (len(row) for item in program.tables.values() for row in item.coefficients), default=0
+        ),
+        "largest_block": largest,
+    }
+    return fill("c/elementary.c.jinja", data)
+
+
+def _splines(program: Program) -> Iterable[str]:
+    """Return the tables of splines."""
+    for name, spline in program.tables.items():
+        rows = [f"{{{', '.join(repr(x) for x in row)}}}" for row in spline.coefficients]
+        lines = [f"static const double {name}_breaks[] = {{"]
+        lines += [f"    {line}" for line in wrapped([repr(x) for x in spline.breaks])]
+        lines += ["};", f"static const double {name}_pieces[][{len(spline.coefficients[0])}] = {{"]
+        lines += [f"    {row}," for row in rows]
+        lines += ["};", f"static const spline_table {name} = {{"]
+        lines += [f"    {len(rows)}, {name}_breaks, {name}_pieces,", "};"]
+        yield "\n".join(lines)
+
+
+@lru_cache(maxsize=16)
+def _solver(name: str) -> str:
+    """Return the printed solver, which depends on nothing but the name of the mechanism."""
+    return CSolver(solver(), name).text()
+
+
+def _scales(program: Program) -> dict[str, str]:
+    """Return what tells large from small in a march: kinds of coordinates, and the criteria."""
+    units = (item.unit for item in program.coordinates)
+    columns = (body.columns for body in program.bodies)
+    angular = [str(int(turns)) for turns in criteria.turning(units, columns)]
+    most = max(len(program.coordinates), len(program.equations))
+    probe = [repr(value) for value in criteria.probe_of(most).tolist()]
+    numbers = {name: repr(getattr(criteria, name)) for name in (*CRITERIA, *COUNTS)}
+    redundant = [str(int(name in program.redundant)) for name in program.equations]
+    return {
+        "angular": _array_lines(angular),
+        "probe": _array_lines(probe),
+        "redundant": _array_lines(redundant),
+        "solver": _solver(program.name),
+        **numbers,
+    }

@@ -1,0 +1,111 @@
+"""The functions of a program as JavaScript: each fills in numbers of a point."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile import quantities
+from kincompile.emitters.javascript.dialect import JAVASCRIPT
+from kincompile.emitters.lines import indented, wrapped
+from kincompile.emitters.planned_solve import explained
+from kincompile.emitters.printer import Printer
+from kincompile.emitters.solve_statements import factorization, operands, solution
+from kincompile.emitters.statements import Statements
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.emitters.evaluators import Listing
+    from kincompile.emitters.planned_solve import BlockCall, SolveListing
+    from kincompile.ir.inline import InlineProgram
+    from kincompile.quantities import Quantity
+
+WRITE = Statements("//", "const {}", "{}[{}]", "")
+
+
+def kernels(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
+    """Return what is computed together; a point alone has no use for all of it at once."""
+    found = quantities.kernels(given)
+    del found["kinematics"]
+    return found
+
+
+def kernel(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+    """Return the function that computes quantities at a point."""
+    results = [quantity for quantity, _ in listing.results]
+    body = WRITE.inputs(code.program, listing) + WRITE.frames(listing, printer)
+    body += WRITE.steps(listing, printer) + WRITE.computed(code, listing, printer)
+    taken = _taken(*quantities.states_of(results), "t", "p", *results)
+    return ["", *_function(f"{name}_at", "at", taken, body)]
+
+
+def single(quantity: Quantity, code: InlineProgram) -> list[str]:
+    """Return the function of a quantity, of one point: an array, or an array of rows."""
+    name, states = quantity.name, ", ".join(quantity.states)
+    kernel_name = _kernel_of(quantity, code)
+    return [
+        "",
+        f"// {quantity.about}",
+        f"function {name}({states}, t, p = DEFAULTS) {{",
+        f'    return evaluated({kernel_name}_at, "{name}", {{ {states} }}, t, p);',
+        "}",
+    ]
+
+
+def _kernel_of(quantity: Quantity, code: InlineProgram) -> str:
+    found = kernels(code.program.quantities)
+    return next(name for name, own in found.items() if quantity.name in own)
+
+
+def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
+    """Return the functions that factor Phi_q and that solve Phi_q x = right."""
+    printer = Printer(JAVASCRIPT, listing.plan.nodes, listing.names)
+    factored = factorization(WRITE, code, listing, printer, _block_call)
+    solved = solution(WRITE, listing, printer, _block_call)
+    return [
+        "",
+        "// What a solve needs of Phi_q, and the determinants of its blocks.",
+        *(f"// {line}" for line in explained(code, listing.plan)),
+        *_function("factor_at", "at", _taken("Phi_q", "F", "determinants"), factored),
+        "",
+        "// x of Phi_q x = right.",
+        *_function("solve_at", "F, right, to", [], solved),
+    ]
+
+
+def _taken(*names: str) -> list[str]:
+    """Return the statement that takes vectors out of a point."""
+    return [f"const {{ {', '.join(names)} }} = at;"]
+
+
+def _function(name: str, arguments: str, first: Sequence[str], body: Sequence[str]) -> list[str]:
+    lines = indented([*first, *body], 1).split("\n")
+    return [f"function {name}({arguments}) {{", *lines, "}"]
+
+
+def _block_call(step: BlockCall, printer: Printer) -> list[str]:
+    """Return the call that solves a block, with the names of the unknowns, or its determinant."""
+    matrix = operands(step.matrix, printer)
+    if not step.right:
+        left = WRITE.value.format(step.names[0])
+        return [f"{left} = block_determinant({step.size}, [", *matrix, "]);"]
+    vector = f"block_of_{step.names[0]}"
+    right = operands(step.right, printer)
+    return [
+        f"const {vector} = block_solve({step.size}, [", *matrix, "], [", *right, "]);",
+        *(f"const {name} = {vector}[{k}];" for k, name in enumerate(step.names)),
+    ]  # fmt: skip
+
+
+def vectors(code: InlineProgram) -> list[str]:
+    """Return the vectors of a point; of matrices the entries that vary are to be filled in."""
+    program = code.program
+    lines = [f"{name}: new Float64Array(N_COORDINATES)," for name in ("q", "q_dot", "q_ddot")]
+    for quantity in program.quantities:
+        if not quantity.is_matrix:
+            lines.append(f"{quantity.name}: new Float64Array({program.shape_of(quantity)[0]}),")
+            continue
+        numbers = [code.number(entry.node) for entry in code.entries(quantity.name)]
+        entries = wrapped("0" if value is None else repr(float(value)) for value in numbers)
+        lines += [f"{quantity.name}: Float64Array.of(", *(f"    {line}" for line in entries), "),"]
+    return lines

@@ -1,0 +1,195 @@
+"""The JavaScript target: one file with the quantities of a mechanism, and its motion.
+
+It runs as a classic script in a page, which needs no server and no network, and under node.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from kincompile import criteria, quantities
+from kincompile.emitters.javascript.dialect import JAVASCRIPT
+from kincompile.emitters.javascript.functions import (
+    WRITE,
+    kernel,
+    kernels,
+    single,
+    solve_functions,
+    vectors,
+)
+from kincompile.emitters.lines import indented, quoted, wrapped
+from kincompile.emitters.naming import NameTable
+from kincompile.emitters.planned_solve import schedule_solve
+from kincompile.emitters.templates import fill, read
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+    from kincompile.emitters.evaluators import Listing
+    from kincompile.emitters.printer import Printer
+    from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.program import Program
+
+DIALECT = JAVASCRIPT
+
+CRITERIA = (
+    "AGREEMENT", "ALLOWED_PART", "ARC_CORRECTIONS", "AROUND", "AROUND_OFFSETS", "ASTRAY", "AS_NEAR",
+    "AT_EVENT", "BEND", "BESIDE", "CONSTANT", "CORNER", "FAR", "FIRST_ARC", "FOLDED", "INVOLVED",
+    "IN_RANGE", "KINK", "LARGEST_ANGLE", "LARGE_ERROR", "LATE", "LONGEST_ARC",
+    "LONGEST_P", "MAX_ARCS", "MAX_CORRECTIONS",
+    "MAX_ITERATIONS", "MAX_SUBSTEPS", "MIRRORED", "MIRROR_STEP", "MOST_MIRRORED", "MOST_TURNED",
+    "NEARLY_SINGULAR", "NEAR_ANGLE", "NEAR_PART", "NUDGE", "OTHER_SIZE", "PATIENCE",
+    "RESIDUAL_FACTOR", "RESTARTS", "ROOT_LENGTH", "ROOT_STEPS", "ROUNDING", "SAME_POSITION",
+    "SAME_TIME", "SETTLED", "SHORTEST_ARC", "SHORTEST_STEP", "SINGULAR_SENSITIVITY",
+    "SMALLEST_PART", "SMALL_CORRECTION", "SMALL_ERROR", "SMALL_PART", "SMOOTH", "SOLVED",
+    "SPATIAL_COORDINATES", "STEEP", "STRAIGHT", "SUFFICIENT", "THROWN", "TOLERABLE_CORRECTION",
+    "TOLERANCE", "TOO_NEAR", "WILD",
+)  # fmt: skip
+"""The numbers of `criteria` that the solver judges by."""
+
+PARTS = ("linear.js", "position.js", "march.js", "events.js")
+"""The parts of the solver, in order."""
+
+KEYWORDS = (
+    "arguments", "await", "break", "case", "catch", "class", "const", "continue", "debugger",
+    "default", "delete", "do", "else", "enum", "eval", "export", "extends", "false", "finally",
+    "for", "function", "if", "implements", "import", "in", "instanceof", "interface", "let", "new",
+    "null", "package", "private", "protected", "public", "return", "static", "super", "switch",
+    "this", "throw", "true", "try", "typeof", "undefined", "var", "void", "while", "with", "yield",
+    "NaN", "Infinity",
+)  # fmt: skip
+"""Words of the language, and names that it does not let be declared."""
+
+STANDARD = (
+    "AggregateError", "Array", "ArrayBuffer", "Atomics", "BigInt", "BigInt64Array",
+    "BigUint64Array", "Boolean", "DataView", "Date", "Error", "EvalError", "FinalizationRegistry",
+    "Float32Array", "Float64Array", "Function", "Infinity", "Int16Array", "Int32Array",
+    "Int8Array", "Intl", "Iterator", "JSON", "Map", "Math", "NaN", "Number", "Object", "Promise",
+    "Proxy", "RangeError", "ReferenceError", "Reflect", "RegExp", "Set", "SharedArrayBuffer",
+    "String", "Symbol", "SyntaxError", "TypeError", "URIError", "Uint16Array", "Uint32Array",
+    "Uint8Array", "Uint8ClampedArray", "WeakMap", "WeakRef", "WeakSet", "WebAssembly",
+    "decodeURI", "decodeURIComponent", "encodeURI", "encodeURIComponent", "escape", "eval",
+    "globalThis", "isFinite", "isNaN", "parseFloat", "parseInt", "undefined", "unescape",
+)  # fmt: skip
+"""What the language brings along; a constant of such a name would hide it."""
+
+RESERVED: tuple[str, ...] = (
+    *KEYWORDS, *STANDARD, *quantities.singles(quantities.QUANTITIES), "q", "q_dot", "q_ddot", "t",
+    "p", "at", "F", "right", "to", "determinants", "block_solve", "block_determinant", "evaluated",
+    *(f"{name}_at" for name in (*quantities.singles(quantities.QUANTITIES), *quantities.TOGETHER)),
+    "factor_at", "solve_at", "require_length", "square", "spline", "DEFAULTS", "N_COORDINATES",
+    "N_EQUATIONS",
+)  # fmt: skip
+"""Names that the functions use."""
+
+TAKEN_BY_ENVIRONMENT = (
+    *STANDARD, "console", "document", "exports", "location", "module", "require", "top", "window",
+)  # fmt: skip
+"""Names that a page or node does not let a script declare, or needs itself."""
+
+
+evaluators = kernels
+"""The functions of a point."""
+
+
+def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+    """Return the lines of a function of a point."""
+    return kernel(name, code, listing, printer)
+
+
+def files(
+    code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
+) -> Mapping[str, str]:
+    """Return the .js file."""
+    program, listing = code.program, schedule_solve(code, RESERVED)
+    lines = [line for own in functions.values() for line in own]
+    for quantity in program.quantities:
+        lines += single(quantity, code)
+    lines += [] if listing is None else solve_functions(code, listing)
+    text = indented(lines)
+    units = {item.name: item.unit for item in program.coordinates}
+    units |= {item.name: item.unit for item in program.parameters}
+    units |= {item.name: item.unit for item in program.outputs}
+    data = {
+        "name": program.name,
+        "format": quantities.FORMAT,
+        "fingerprint": program.fingerprint,
+        "n": len(program.coordinates),
+        "m": len(program.equations),
+        "k": len(program.parameters),
+        "lists": {name: indented(lines, 2) for name, lines in _lists(code).items()},
+        "units": indented(wrapped(f'"{name}": "{unit}"' for name, unit in units.items()), 2),
+        "corners": str(program.corners).lower(),
+        "matrices": indented(_matrices(code), 2),
+        "header": WRITE.heading(code),
+        "variable": NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(program.name),
+        "tables": indented(_tables(program)),
+        "table_names": ", ".join(program.tables),
+        "has_square": "square(" in text,
+        "has_blocks": listing is not None and listing.plan.has_large_blocks,
+        "functions": text,
+        "vectors": indented(vectors(code), 3),
+        "n_factors": 0 if listing is None else len(listing.factors),
+        "n_blocks": 0 if listing is None else len(listing.plan.determinants),
+        "solver": "" if listing is None else _solver(),
+        "returned": indented(
+            wrapped(
+                [*(item.name for item in program.quantities), *(f"{name}_at" for name in functions)]
+            ),
+            2,
+        ),
+    }
+    return {f"{program.name}.js": fill("javascript/module.js.jinja", data)}
+
+
+def _solver() -> str:
+    """Return the script that solves for the motion, with the criteria of the runtime."""
+    numbers = wrapped(f"{name} = {json.dumps(getattr(criteria, name))}" for name in CRITERIA)
+    text = "\n".join(f"        {line}" for line in numbers).strip().rstrip(",")
+    parts = "\n".join(read(f"javascript/{name}") for name in PARTS)
+    slots = {"criteria": text, "parts": indented(parts.rstrip().split("\n"))}
+    return indented(fill("javascript/solver.js.jinja", slots).rstrip().split("\n"))
+
+
+def _lists(code: InlineProgram) -> dict[str, list[str]]:
+    """Return the lines of the module's constant arrays, by name."""
+    program = code.program
+    bodies = (f'["{x.name}", {x.columns.start}, {len(x.columns)}]' for x in program.bodies)
+    lists = {
+        "COORDINATES": quoted(item.name for item in program.coordinates),
+        "EQUATIONS": quoted(program.equations),
+        "PARAMETERS": quoted(item.name for item in program.parameters),
+        "DEFAULTS": wrapped(repr(item.default) for item in program.parameters),
+        "GUESS": wrapped(repr(item.guess) for item in program.coordinates),
+        "OUTPUTS": quoted(item.name for item in program.outputs),
+        "BODIES": wrapped(bodies),
+        "PATTERN": wrapped(f"[{row}, {column}]" for row, column in code.pattern()),
+    }
+    return lists | ({"REDUNDANT": quoted(program.redundant)} if program.redundant else {})
+
+
+def _matrices(code: InlineProgram) -> list[str]:
+    """Return rows, columns and pattern of each matrix, by name."""
+    lines = []
+    for quantity in code.program.quantities:
+        if quantity.is_matrix:
+            rows, columns = code.program.shape_of(quantity)
+            places = wrapped(f"[{i}, {j}]" for i, j in code.pattern(quantity.name))
+            pattern = ["pattern: [", *(f"    {line}" for line in places), "],"]
+            pattern = ["pattern: PATTERN,"] if quantity.name == "Phi_q" else pattern
+            own = [f"rows: {rows}, columns: {columns},", *pattern]
+            lines += [f"{quantity.name}: {{", *(f"    {line}" for line in own), "},"]
+    return lines
+
+
+def _tables(program: Program) -> list[str]:
+    """Return the tables of splines."""
+    lines = []
+    for name, spline in program.tables.items():
+        lines += [f"const {name} = {{", "    breaks: ["]
+        lines += [f"        {line}" for line in wrapped(repr(x) for x in spline.breaks)]
+        lines += ["    ],", "    pieces: ["]
+        lines += [f"        [{', '.join(map(repr, row))}]," for row in spline.coefficients]
+        lines += ["    ],", "};"]
+    return lines

@@ -1,0 +1,266 @@
+"""The Octave target, which is MATLAB too: functions of Phi, Phi_q, nu, gamma, and a script.
+
+This is the shape in which courses write them: column vectors, rows that count from 1, and a script
+that solves position, velocity and acceleration over time with Newton's method. No toolbox.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from kincompile import criteria, quantities
+from kincompile.emitters.lines import indented, pieces
+from kincompile.emitters.naming import NameTable
+from kincompile.emitters.octave.dialect import NAMES, OCTAVE
+from kincompile.emitters.planned_solve import schedule_determinants
+from kincompile.emitters.printer import Printer
+from kincompile.emitters.solve_statements import factorization
+from kincompile.emitters.statements import Statements
+from kincompile.emitters.templates import fill
+from kincompile.errors import InputError, UnsupportedError
+from kincompile.ir.elimination import plan_solve, sizes_of
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping
+
+    from kincompile.emitters.evaluators import Listing
+    from kincompile.emitters.planned_solve import BlockCall
+    from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.program import Program
+    from kincompile.model.spline import SplineTable
+
+DIALECT = OCTAVE
+
+WRITE = Statements("%", "{}", "{}({})", "{}({}, {})", "[c, -s; s, c]", first=1, continued=" ...")
+
+LONGEST_NAME = 63
+"""Longest name; MATLAB truncates longer ones."""
+
+CRITERIA = (
+    "ASTRAY", "AS_NEAR", "BEND", "CONSTANT", "FAR", "FOLDED", "LARGEST_ANGLE", "LONGEST_P",
+    "MAX_CORRECTIONS", "MAX_ITERATIONS", "MIRRORED", "MIRROR_STEP", "MOST_MIRRORED", "MOST_TURNED",
+    "NEAR_ANGLE", "NEAR_PART", "NUDGE", "RESIDUAL_FACTOR", "RESTARTS", "ROUNDING", "SAME_POSITION",
+    "SETTLED", "SHORTEST_STEP", "SMALL_PART", "STEEP", "SUFFICIENT", "THROWN", "TOLERANCE", "WILD",
+)  # fmt: skip
+"""The numbers of `criteria` that a start is judged by."""
+
+KEYWORDS = (
+    "break", "case", "catch", "classdef", "continue", "do", "else", "elseif", "end", "endif",
+    "endfor", "endfunction", "endwhile", "endswitch", "for", "function", "global", "if",
+    "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "until", "while",
+    "unwind_protect", "unwind_protect_cleanup",
+)  # fmt: skip
+"""Words of MATLAB and of Octave."""
+
+CALLED = (
+    *NAMES.values(), "abs", "all", "any", "circshift", "deal", "det", "diag", "double", "either",
+    "eps", "error", "eye", "false", "find", "in_reals", "Inf", "isempty", "isfinite", "isnan",
+    "isreal", "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "num2cell", "numel",
+    "ode45", "odeset", "ones", "pi", "pinv", "polyval", "rank", "rcond", "round", "sign", "single",
+    "size", "sortrows", "sqrt", "sum", "svd", "true", "zeros",
+)  # fmt: skip
+"""Functions that the files call; a script of such a name would be called in their place."""
+
+CONSTANTS = ("ans", "e", "i", "I", "j", "J", "NA")
+"""And others that a user may write beside them."""
+
+RESERVED: tuple[str, ...] = (
+    *KEYWORDS, *CALLED, *quantities.singles(quantities.QUANTITIES), "q", "q_dot", "q_ddot", "t",
+    "p",
+)  # fmt: skip
+"""Names that the functions use."""
+
+
+evaluators = quantities.singles
+"""The functions: one a quantity."""
+
+
+def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+    """Return the lines of a function; refuse names longer than MATLAB reads."""
+    _require_short(listing.names.values())
+    rows, columns = (*code.program.shape_of(quantities.quantity_named(name)), 1)[:2]
+    lines = WRITE.inputs(code.program, listing)
+    values = WRITE.frames(listing, printer) + WRITE.steps(listing, printer)
+    zeros = f"{name} = zeros({rows}, {columns});"
+    results = WRITE.results(name, code, printer)
+    return [*lines, *values, *([""] if values else []), zeros, *results]
+
+
+def files(
+    code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
+) -> Mapping[str, str]:
+    """Return the .m files, the script first; refuse names longer than MATLAB reads."""
+    program = code.program
+    found = {NameTable((*KEYWORDS, *CALLED, *CONSTANTS)).take(program.name): _script(code)}
+    if not program.unsolvable and not program.motion:
+        found[f"{program.name}_assemble"] = _assembly(code)
+    for name, lines in functions.items():
+        found[f"{program.name}_{name}"] = _function_file(name, code, "\n".join(lines))
+    for name, spline in program.tables.items():
+        found[f"{program.name}_{name}"] = _spline(f"{program.name}_{name}", spline)
+    _require_short(found)
+    return {f"{name}.m": text for name, text in found.items()}
+
+
+def _require_short(names: Iterable[str]) -> None:
+    """Refuse a name that MATLAB would take for another."""
+    long = [name for name in names if len(name) > LONGEST_NAME]
+    if long:
+        raise UnsupportedError(
+            f"MATLAB reads {LONGEST_NAME} characters of a name, and {long[0]!r} has {len(long[0])};"
+            " give shorter names to the mechanism, its bodies and its constraints"
+        )
+
+
+def _function_file(name: str, code: InlineProgram, body: str) -> str:
+    """Return the file of one function."""
+    program = code.program
+    quantity = quantities.quantity_named(name)
+    shape = "" if quantity.is_matrix else ", a column"
+    data = {
+        "quantity": name,
+        "name": program.name,
+        "arguments": ", ".join(quantity.reads),
+        "n_arguments": len(quantity.reads),
+        "about": f"{quantity.about[:-1]}{shape}.",
+        "header": WRITE.header(code),
+        "fingerprint": program.fingerprint,
+        "defaults": _column(((item.name, item.default) for item in program.parameters), 2),
+        "body": body,
+        "functions": _called_in(body),
+    }
+    return fill("octave/function.m.jinja", data).rstrip("\n") + "\n"
+
+
+def _called_in(body: str) -> str:
+    """Return the functions of the templates that a body calls."""
+    own = ("either", "in_reals")
+    return "".join(fill(f"octave/{name}.m.jinja", {}) for name in own if f"{name}(" in body)
+
+
+def _column(items: Iterable[tuple[str, float | None]], level: int) -> str:
+    """Return named numbers as the lines of a column vector."""
+    return "\n".join(f"{'    ' * level}{value!r}  % {name}" for name, value in items)
+
+
+def _spline(name: str, spline: SplineTable) -> str:
+    """Return the file of a table."""
+    pieces = (", ".join(map(repr, row)) for row in spline.coefficients)
+    data = {
+        "name": name,
+        "breaks": "\n".join(f"        {x!r}" for x in spline.breaks),
+        "pieces": "\n".join(f"        {row}" for row in pieces),
+    }
+    return fill("octave/spline.m.jinja", data)
+
+
+def _literal(text: str) -> str:
+    """Return a string and the sign that the next line goes on with it."""
+    return "'" + text.replace("'", "''") + "' ..."
+
+
+def _numbers(places: Iterable[int]) -> str:
+    """Return numbers of rows or columns, which count from 1."""
+    return f"[{', '.join(str(k + 1) for k in places)}]"
+
+
+def _turning(program: Program) -> list[int]:
+    """Return the coordinates that may turn: angles, and free ones whose unit is not known."""
+    owned = {column for body in program.bodies for column in body.columns}
+    units = [item.unit for item in program.coordinates]
+    return [k for k, unit in enumerate(units) if unit == "rad" or not (unit or k in owned)]
+
+
+def _covers(program: Program) -> str:
+    """Return the places of the Euler parameters of bodies in space, a column for each body."""
+    spatial = criteria.SPATIAL_COORDINATES
+    bodies = [x.columns for x in program.bodies if len(x.columns) == spatial]
+    rows = (" ".join(str(columns[k] + 1) for columns in bodies) for k in range(3, spatial))
+    return "; ".join(rows) if bodies else ""
+
+
+def _determinants(code: InlineProgram) -> list[str]:
+    """Return the statements that take Phi_q to the determinants that tell branches apart."""
+    plan = None if code.program.redundant else plan_solve(code)
+    if plan is None:
+        return []  # nothing but the independent rows has a determinant
+    table = NameTable((*RESERVED, "determinants"))
+    # Names of bodies and constraints could be too long for MATLAB.
+    names = {node: table.take(f"a_{row + 1}_{column + 1}") for row, column, node in plan.entries}
+    listing = schedule_determinants(plan, names, table)
+    printer = Printer(DIALECT, plan.nodes, names, code.program.name)
+    return factorization(WRITE, code, listing, printer, _block_call)
+
+
+def _block_call(step: BlockCall, printer: Printer) -> list[str]:
+    """Return the statement that takes the determinant of a large block."""
+    rows = [step.matrix[k : k + step.size] for k in range(0, len(step.matrix), step.size)]
+    lines = [", ".join(map(printer.text, row)) for row in rows]
+    return [f"{step.names[0]} = det([", *(f"    {line}" for line in lines), "]);"]
+
+
+def _script(code: InlineProgram) -> str:
+    """Return the script that solves the motion, or with equations of motion integrates it."""
+    program = code.program
+    try:
+        end, points = float(program.end), int(program.points)
+    except (TypeError, ValueError):
+        end, points = math.nan, 0
+    if not math.isfinite(end) or points < 1:
+        raise InputError(
+            f"end = {program.end!r}, points = {program.points!r}: give a finite time, and at least "
+            "one point"
+        )
+    data: dict[str, object] = {
+        "name": program.name,
+        "header": WRITE.header(code),
+        "n": len(program.coordinates),
+        "end": repr(end),
+        "points": points,
+        "defaults": _column(((item.name, item.default) for item in program.parameters), 1),
+        "guess": _column(((item.name, item.guess) for item in program.coordinates), 1),
+    }
+    found = sizes_of(code).scales.values()
+    data["scale"] = _column(zip(program.names_of("coordinates"), found, strict=True), 1)
+    if program.motion:
+        names = ("ASSEMBLED", "RANK", "ROUNDING", "TOLERANCE")
+        data |= {"m": len(program.equations), **_criteria(names)}
+        return fill("octave/motion.m.jinja", data)
+    data |= _criteria((
+        "MAX_ITERATIONS", "RESIDUAL_FACTOR", "ROUNDING", "SINGULAR_SENSITIVITY", "STEEP",
+        "TOLERANCE",
+    ))  # fmt: skip
+    data |= {
+        "unsolvable": indented(_literal(piece) for piece in pieces(program.unsolvable)),
+        "has_redundant": bool(program.redundant),
+        "part": repr(criteria.AGREEMENT if program.redundant else criteria.SOLVED),
+    }
+    return fill("octave/script.m.jinja", data)
+
+
+def _criteria(names: Iterable[str]) -> dict[str, str]:
+    """Return numbers by which is judged, by name."""
+    return {name: repr(getattr(criteria, name)) for name in names}
+
+
+def _assembly(code: InlineProgram) -> str:
+    """Return the function that finds the position at the first time."""
+    program = code.program
+    units = (item.unit for item in program.coordinates)
+    columns = (body.columns for body in program.bodies)
+    angles = [k for k, turns in enumerate(criteria.turning(units, columns)) if turns]
+    determinants = "\n".join(_determinants(code))
+    data = {
+        "name": program.name,
+        "fingerprint": program.fingerprint,
+        "n": len(program.coordinates),
+        "angles": _numbers(angles),
+        "may_turn": _numbers(_turning(program)),
+        "m": len(program.equations),
+        "covers": _covers(program),
+        "determinants": determinants,
+        "functions": _called_in(determinants),
+        **{name: repr(getattr(criteria, name)) for name in CRITERIA},
+    }
+    return fill("octave/assemble.m.jinja", data).rstrip("\n") + "\n"

@@ -1,0 +1,51 @@
+"""The table of targets; the modules of one are loaded when a program is first emitted in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from kincompile.emitters.target import Emitted, Target
+    from kincompile.ir.grouping import GroupedProgram
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """A line of the table."""
+
+    # Package whose module `target` is the `Target`, and whose module `grouped` has `emit_grouped`
+    # where there is a grouped form.
+    folder: str
+    endings: tuple[str, ...]  # endings of its files, that of the main one first
+    is_loadable: bool = False  # whether this process can call its code
+    has_grouped_form: bool = False  # whether it has a form for large mechanisms
+
+
+TARGETS = {
+    "numpy": Listed(
+        "kincompile.emitters.numpy", (".py",),
+        is_loadable=True, has_grouped_form=True,
+    ),
+    "c": Listed("kincompile.emitters.c", (".c", ".h"), is_loadable=True),
+    "octave": Listed("kincompile.emitters.octave", (".m",)),
+    "javascript": Listed("kincompile.emitters.javascript", (".js",)),
+    "rust": Listed("kincompile.emitters.rust", (".rs",)),
+}  # fmt: skip
+"""Languages to emit."""
+
+
+def load_target(name: str) -> Target:
+    """Return a target, whose modules are loaded now."""
+    target: Target = import_module(f"{TARGETS[name].folder}.target")
+    return target
+
+
+def load_grouped_form(name: str) -> Callable[[GroupedProgram], Emitted]:
+    """Return the function that writes the grouped form of a target."""
+    emit: Callable[[GroupedProgram], Emitted]
+    emit = import_module(f"{TARGETS[name].folder}.grouped").emit_grouped
+    return emit

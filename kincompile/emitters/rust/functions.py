@@ -1,0 +1,128 @@
+"""The functions of a program as Rust: each fills in numbers of a point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from kincompile import quantities
+from kincompile.emitters.lines import indented, wrapped
+from kincompile.emitters.planned_solve import explained
+from kincompile.emitters.printer import Printer
+from kincompile.emitters.rust.dialect import RUST
+from kincompile.emitters.solve_statements import factorization, operands, solution
+from kincompile.emitters.statements import Statements
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.emitters.evaluators import Listing
+    from kincompile.emitters.planned_solve import BlockCall, SolveListing
+    from kincompile.ir.inline import InlineProgram
+    from kincompile.quantities import Quantity
+
+WRITE = Statements("//", "let {}", "at.{}[{}]", "", kept="{} as u8 as f64", taken="{} != 0.0")
+SOLVE = replace(WRITE, element="{}[{}]")
+
+
+def kernels(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
+    """Return what is computed together; a point alone has no use for all of it at once."""
+    found = quantities.kernels(given)
+    del found["kinematics"]
+    return found
+
+
+def kernel(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+    """Return the function that computes quantities at a point."""
+    body = WRITE.inputs(code.program, listing)
+    body += ["let t = at.t;"] if "t" in listing.inputs else []
+    body += WRITE.frames(listing, printer) + WRITE.steps(listing, printer)
+    body += WRITE.computed(code, listing, printer)
+    return ["", *_function(f"fn {name}_at(at: &mut Point)", body)]
+
+
+def single(quantity: Quantity, code: InlineProgram) -> list[str]:
+    """Return the function of a quantity, of one point: an array, or an array of rows."""
+    name, states = quantity.name, quantity.states
+    found = kernels(code.program.quantities)
+    kernel_name = next(name for name, own in found.items() if quantity.name in own)
+    rows, *columns = code.program.shape_of(quantity)
+    kind = f"[[f64; {columns[0]}]; {rows}]" if columns else f"[f64; {rows}]"
+    given = [*(f"{x}: &[f64; N_COORDINATES]" for x in states), "t: f64", "p: &[f64; N_PARAMETERS]"]
+    body = [
+        "let mut at = Point::new();",
+        *(f"at.{x} = *{x};" for x in states),
+        "at.t = t;",
+        "at.p = *p;",
+        f"{kernel_name}_at(&mut at);",
+    ]
+    if columns:
+        pattern = "PATTERN" if name == "Phi_q" else f"PATTERN_{name}"
+        body += [
+            f"let mut matrix = [[0.0; {columns[0]}]; {rows}];",
+            f"for (k, &[i, j]) in {pattern}.iter().enumerate() {{",
+            f"    matrix[i][j] = at.{name}[k];",
+            "}",
+            "matrix",
+        ]
+    else:
+        body.append(f"at.{name}")
+    head = [f"pub fn {name}(", *(f"    {x}," for x in given), f") -> {kind} {{"]
+    return ["", f"/// {quantity.about}", *head, *(f"    {x}" for x in body), "}"]
+
+
+def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
+    """Return the functions that factor Phi_q and that solve Phi_q x = right."""
+    printer = Printer(RUST, listing.plan.nodes, listing.names)
+    factored = factorization(WRITE, code, listing, printer, _block_call)
+    solved = [
+        "let mut to = [0.0; N_COORDINATES];",
+        *solution(SOLVE, listing, printer, _block_call),
+        "to",
+    ]
+    return [
+        "",
+        "// What a solve needs of Phi_q, and the determinants of its blocks.",
+        *(f"// {line}" for line in explained(code, listing.plan)),
+        *_function("fn factor_at(at: &mut Point)", factored),
+        "",
+        "// x of Phi_q x = right.",
+        *_function(
+            "fn solve_at(F: &[f64; FACTORS], right: &[f64; N_EQUATIONS]) -> [f64; N_COORDINATES]",
+            solved,
+        ),
+    ]
+
+
+def _function(head: str, body: Sequence[str]) -> list[str]:
+    return [f"{head} {{", *indented(body).split("\n"), "}"]
+
+
+def _block_call(step: BlockCall, printer: Printer) -> list[str]:
+    """Return the call that solves a block, with the names of the unknowns, or its determinant."""
+    matrix = operands(step.matrix, printer)
+    if not step.right:
+        left = WRITE.value.format(step.names[0])
+        return [f"{left} = block_determinant::<{step.size}>(&[", *matrix, "]);"]
+    vector = f"block_of_{step.names[0]}"
+    right = operands(step.right, printer)
+    return [
+        f"let {vector} = block_solve::<{step.size}>(&[", *matrix, "], [", *right, "]);",
+        *(f"let {name} = {vector}[{k}];" for k, name in enumerate(step.names)),
+    ]  # fmt: skip
+
+
+def vectors(code: InlineProgram) -> tuple[list[str], list[str]]:
+    """Return the fields of a point, and their first values: entries that never change have them."""
+    program, fields, values = code.program, [], []
+    for quantity in program.quantities:
+        numbers = [code.number(entry.node) for entry in code.entries(quantity.name)]
+        if not quantity.is_matrix:
+            size = program.shape_of(quantity)[0]
+            fields.append(f"pub {quantity.name}: [f64; {size}],")
+            values.append(f"{quantity.name}: [0.0; {size}],")
+            continue
+        entries = wrapped("0.0" if value is None else repr(float(value)) for value in numbers)
+        fields.append(f"pub {quantity.name}: [f64; {len(numbers)}],")
+        values += [f"{quantity.name}: [", *(f"    {line}" for line in entries), "],"]
+    return fields, values

@@ -1,0 +1,139 @@
+"""Sets of parameters on the branch of one of them: the march, on a straight line of parameters.
+
+A mechanism that is assembled with some parameters leads to how it is assembled with others: along
+the line between them it moves as under a driver, and stays on its branch. So a part of that line
+takes the place of time, and all that follows a motion follows this one too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.criteria import BEYOND, LARGE_ERROR, MAX_CORRECTIONS, SMALLEST_PART
+from kincompile.runtime.engine.dense import Dense
+from kincompile.runtime.engine.planned import Planned
+from kincompile.runtime.engine.sparse import Sparse
+from kincompile.runtime.march import March, State, chosen, some_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from kincompile.runtime.engine.code import Array, Code
+    from kincompile.runtime.inputs import Inputs
+    from kincompile.runtime.problem import Problem
+
+    Mask = NDArray[np.bool_]
+
+FIRST, SECOND = 1e-5, 1e-4
+"""Parts of a line over which differences give first and second derivatives, for predictions alone:
+what is found holds as Newton's method makes it hold."""
+
+MOST_PARTS = 1000
+"""Parts of a line after which its end is given up."""
+
+
+def along(code: Code, p: Array, t: float) -> Code:
+    """Return the equations at one time on lines from parameters p: the way along is their time."""
+
+    def parameters(part: Any, to: Array) -> Array:
+        begin = p if to.ndim == 1 else p[:, np.newaxis]
+        return np.asarray(begin + part * (to - begin))
+
+    def position(q: Array, part: Any, to: Array) -> Any:
+        return (code.evaluate or code.position)(q, t, parameters(part, to))
+
+    def nu(q: Array, part: float, to: Array) -> Array:
+        before, after = (position(q, part + side * FIRST, to)[0] for side in (-1, 1))
+        return np.asarray((before - after) / (2 * FIRST))
+
+    def gamma(q: Array, q_dot: Array, part: float, to: Array) -> Array:
+        before, here, after = (
+            position(q + side * SECOND * q_dot, part + side * SECOND, to)[0] for side in (-1, 0, 1)
+        )
+        return np.asarray((2 * here - before - after) / SECOND**2)
+
+    found = replace(code, position=position, written=position, nu=nu, gamma=gamma, redundant=())
+    own, m = code.lanes, len(code.equations)
+    if own is None:
+        return replace(found, evaluate=code.evaluate and position)
+
+    def lanes(f: Any, q: Sequence[Any], part: Any, to: Array) -> Sequence[Any]:
+        return own.position(f, q, t, parameters(part, to))
+
+    def nu_of_lanes(f: Any, q: Sequence[Any], part: Any, to: Array) -> Sequence[Any]:
+        before, after = (lanes(f, q, part + side * FIRST, to)[:m] for side in (-1, 1))
+        return [(x - y) / (2 * FIRST) for x, y in zip(before, after, strict=True)]
+
+    def gamma_of_lanes(f: Any, q: Any, q_dot: Any, part: Any, to: Array) -> Sequence[Any]:
+        before, here, after = (
+            lanes(f, [x + side * SECOND * v for x, v in zip(q, q_dot, strict=True)],
+                  part + side * SECOND, to)[:m]
+            for side in (-1, 0, 1)
+        )  # fmt: skip
+        rows = zip(before, here, after, strict=True)
+        return [(2 * y - x - z) / SECOND**2 for x, y, z in rows]
+
+    own_lanes = replace(own, position=lanes, nu=nu_of_lanes, gamma=gamma_of_lanes)
+    return replace(found, lanes=own_lanes)
+
+
+def lead_together(
+    inputs: Inputs, equations: Problem, begin: Array, sets: Array
+) -> tuple[Array, Mask, Mask]:
+    """Lead a position (n,) with the inputs' parameters to sets (B, k) of them, side by side.
+
+    Returns positions (n, B), which of them are those of their set, and which lines end at a
+    bifurcation: the mechanism goes on there, but nothing says on which branch.
+    """
+    code = along(inputs.code, inputs.p, float(inputs.t[0]))
+    q = np.repeat(begin[:, np.newaxis], len(sets), axis=1)
+    way, part = np.zeros(len(sets)), np.ones(len(sets))
+    left = np.arange(len(sets))
+
+    def march_of(some: NDArray[np.intp]) -> March:
+        engine = Planned(code, np.ascontiguousarray(sets[some].T))
+        return March(equations, engine, inputs.tolerance)
+
+    march = march_of(left)
+    state, _ = march.complete(march.engine.evaluate(q, way))
+    for _ in range(MOST_PARTS):
+        to = np.minimum(way[left] + part[left], 1.0)
+        following, good, _ = march.step_together(state, to, MAX_CORRECTIONS)
+        state = chosen(good, following, state)
+        q[:, left], way[left] = state.point.q, state.t
+        part[left] = march.pace(state, 1.0, part[left], good, SMALLEST_PART)
+        on = (way[left] < 1) & (part[left] > SMALLEST_PART)
+        if not on.any():
+            break
+        if not on.all():
+            left, state = left[on], some_of(state, on)
+            march = march_of(left)
+    reached, crosses = way == 1, np.zeros(len(sets), dtype=bool)
+    lost = np.flatnonzero(~reached & (way > 0))
+    if lost.size:
+        beyond = march_of(lost).correct_together(q[:, lost], way[lost] + BEYOND, MAX_CORRECTIONS)
+        apart = equations.extent(beyond.point.q - q[:, lost])
+        crosses[lost] = beyond.good & (apart <= LARGE_ERROR)
+    return q, reached, crosses
+
+
+def lead(inputs: Inputs, equations: Problem, begin: Array, p: Array) -> tuple[Array | None, bool]:
+    """Do the same for one set (k,): its position, None where it is not reached, and how it ends."""
+    code = along(inputs.code, inputs.p, float(inputs.t[0]))
+    engine = Sparse(code, p) if code.blocks else Dense(code, p)
+    march = March(equations, engine, inputs.tolerance)
+    state = march.state(engine.evaluate(begin, 0.0))
+    if not isinstance(state, State):
+        return None, False
+    outcome = march.advance(state, 1.0, inputs.max_iterations)
+    if outcome.position is not None:
+        return outcome.position.q, False
+    last = outcome.state or state
+    beyond = march.correct(last.point.q, last.t + BEYOND, MAX_CORRECTIONS)
+    apart = equations.extent(beyond.point.q - last.point.q)
+    return None, bool(last.t > 0 and beyond.good and apart <= LARGE_ERROR)

@@ -1,0 +1,72 @@
+"""The engine of large mechanisms: Phi_q stays sparse, and is solved block by block."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kincompile.runtime.engine.blocks import BlockSolver
+from kincompile.runtime.engine.linear import Linear, Rates
+from kincompile.runtime.engine.scales import Point
+
+if TYPE_CHECKING:
+    from kincompile.runtime.engine.code import Array, Code
+
+
+class Sparse(Linear):
+    """An engine of one point at a time, in grouped form: Phi_q is the entries of its pattern."""
+
+    def __init__(self, code: Code, p: Array) -> None:
+        assert code.evaluate is not None
+        self.code, self._p, self._evaluate = code, p, code.evaluate
+        self._solver = BlockSolver(code)
+        self.reference = np.ones(len(code.coordinates))  # scales of the coordinates
+
+    @property
+    def pivoted(self) -> int:
+        """How often the planned solve was not good enough."""
+        return self._solver.pivoted
+
+    def evaluate(self, q: Array, t: float) -> Point:
+        """Evaluate Phi and the entries of Phi_q at one point."""
+        return Point(q, t, *self._evaluate(q, t, self._p))
+
+    def factor(self, point: Point) -> None:
+        """Factor Phi_q of a point, once."""
+        if point.factors is None:
+            point.factors = self._solver.factor(point.Phi_q)
+
+    def solve(self, point: Point, b: Array, *, checked: bool = False) -> Array:
+        """Return x of Phi_q x = b, in half the time if it is not checked in the equations.
+
+        A correction of Newton's method need not be: its convergence tells.
+        """
+        self.factor(point)
+        return self._solver.solve(point.factors, b, self.reference if checked else None)
+
+    def rates(self, point: Point, besides: Array | None) -> Rates:
+        """Return the rates at a point, and x of Phi_q x = besides if that is asked for."""
+        q, t, p = point.q, point.t, self._p
+        nu = self.code.nu(q, t, p)
+        q_dot = self.solve(point, nu, checked=True)
+        if not np.isfinite(q_dot).all():
+            nothing = np.full(q.size, np.nan)
+            return Rates(q_dot, nothing, nothing, nu, nothing)
+        gamma = self.code.gamma(q, q_dot, t, p)
+        q_ddot = self.solve(point, gamma, checked=True)
+        movement = np.empty(0) if besides is None else self.solve(point, besides)
+        return Rates(q_dot, q_ddot, movement, nu, gamma)
+
+    def missing(self, point: Point, x: Array, b: Array) -> Array:
+        """Return Phi_q x - b."""
+        return self._solver.product(point.Phi_q, x) - b
+
+    def determinants(self, point: Point, before: Point) -> Array:
+        """Return the determinants of the blocks."""
+        self.factor(point)
+        return self._solver.determinants(point.factors)
+
+    def signs(self, point: Point) -> tuple[float, ...]:
+        """Return the signs of the determinants."""
+        return tuple(np.sign(self.determinants(point, point)).tolist())

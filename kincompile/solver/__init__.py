@@ -1,0 +1,1 @@
+"""The solver of emitted code, written once: its text, what its words mean, and what reads it."""

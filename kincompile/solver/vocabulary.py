@@ -1,0 +1,102 @@
+"""What the text of the solver may say: its types, sizes, tables, criteria and words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kincompile.solver.nodes import BOOL, COUNT, INT, LANE, REAL, Type
+
+LANES_OF_REALS = Type("real", (LANE,))
+
+TYPES = {
+    "Real": REAL,
+    "Int": INT,
+    "Count": COUNT,
+    "Bool": BOOL,
+    "Lane": LANES_OF_REALS,
+    "LaneInt": Type("int", (LANE,)),
+    "LaneBool": Type("bool", (LANE,)),
+    "Vector": Type("real", ("any",)),
+    "Table": Type("real", ("any", "any")),
+    "Block": Type("real", ("any", "any", "any")),
+}
+"""Annotations. ``Row[N]``, ``Rows[N]`` and ``Vector[Int]`` are read beside them."""
+
+SIZES = ("N", "M", "K", "LANES", "NONZEROS", "BLOCKS")
+"""Coordinates, equations, parameters, points at once, entries of Phi_q, blocks of its solve."""
+
+STATUSES = {
+    "CONVERGED": 0, "NOT_CONVERGED": 1, "SINGULAR": 2, "NOT_FINITE": 3, "NOT_REACHED": 4,
+    "LOCK_UP": 7,
+}  # fmt: skip
+"""What becomes of a point, and the numbers that say so in all languages."""
+
+COUNTS = ("MAX_CORRECTIONS", "MAX_SUBSTEPS")
+
+CRITERIA = (
+    "AGREEMENT", "BEFORE_LOCK_UP", "GROWN", "KINK", "LEFT", "NEARLY_SINGULAR",
+    "RESIDUAL_FACTOR", "ROUNDING", "SMALL_ERROR", "SMALLEST_PART", "SMOOTH", "SOLVED",
+    "TOO_NEAR",
+)  # fmt: skip
+"""The numbers of `criteria` that the text judges by, besides `COUNTS`."""
+
+TABLES = {
+    "ANGULAR": Type("bool", ("N",)),
+    "IS_REDUNDANT": Type("bool", ("M",)),
+    "PROBE": Type("real", ("most",)),
+    "PATTERN": Type("int", ("NONZEROS", "two")),
+}
+"""Which coordinates are angles, which equations repeat others, numbers without a pattern (as many
+as there are coordinates or equations), and the row and column of each entry of Phi_q."""
+
+CONSTANTS = (
+    dict.fromkeys((*SIZES, *STATUSES, *COUNTS), INT)
+    | dict.fromkeys((*CRITERIA, "NOTHING", "INFINITE"), REAL)
+    | TABLES
+)
+"""Names that have one value. `NOTHING` is the number that is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """What a call of a word takes and gives.
+
+    `takes` has a type for each argument: a name of `TYPES`, of a struct, or of several: "number"
+    and "rows" are any of the kind, and "same" is as the first argument. `gives` is such a name.
+    A word that is lanewise is called for as many lanes as a function that is. `changes` are the
+    numbers of the arguments that it changes.
+    """
+
+    takes: tuple[str, ...]
+    gives: str = ""
+    is_lanewise: bool = False
+    changes: tuple[int, ...] = ()
+
+
+KERNELS = ("position", "factor", "nu", "gamma", "constants")
+"""Phi and Phi_q, the factors of Phi_q, the right sides, the entries of Phi_q that never change."""
+
+
+WORDS = {
+    # of the mechanism: what kernels compute at points, and x of Phi_q x = b
+    **dict.fromkeys(KERNELS, Word(("Point",), is_lanewise=True, changes=(0,))),
+    "solve": Word(("Point", "rows"), "Rows[N]", is_lanewise=True),
+    # what velocity and acceleration miss of their equations: sums of squares with weights
+    "missed": Word(("Point", "rows", "Lane", "Lane"), is_lanewise=True, changes=(2, 3)),
+    # of numbers
+    "abs": Word(("number",), "same"),
+    "finite": Word(("number",), "truth"),
+    "max": Word(("number", "same"), "same"),
+    "min": Word(("number", "same"), "same"),
+    # of lanes: whether it holds for any, a part of a vector from a place on, a lane as a good point
+    # and back for lanes from one to before another, the points, without what kernels computed
+    "any_lane": Word(("LaneBool",), "Bool", is_lanewise=True),
+    "part": Word(("Vector", "Count"), "Lane"),
+    "take_up": Word(("State", "Point", "Count"), changes=(0,)),
+    "put_at": Word(("Point", "State", "Count", "Count"), changes=(0,)),
+    "keep": Word(("Point", "Point"), changes=(0,)),
+    # of arrays: a copy; the first lanes of rows into a block, at a time, from a variant on
+    "copied": Word(("rows",), "same"),
+    "store": Word(("Block", "rows", "Count", "Count", "Count"), changes=(0,)),
+}
+"""Words that are called. ``where``, ``rows(N)`` and ``lanes`` are read beside them."""

@@ -1,0 +1,225 @@
+"""What the words of the solver's text mean on NumPy, where a lane is an array over points.
+
+`on_numpy` gives the text of a mechanism as a module: a copy of its own, whose sizes, criteria and
+kernels are the mechanism's. The values below stand for those until then.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import inspect
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kincompile.solver import vocabulary
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from types import ModuleType
+
+Array = NDArray[Any]
+
+BASES = {"real": float, "int": np.intc, "bool": bool}
+
+
+@dataclass(frozen=True, slots=True)
+class Mechanism:
+    """What the text must know of a mechanism.
+
+    `sizes` are those of `vocabulary.SIZES`, `tables` those of `vocabulary.TABLES`. Of the kernels
+    `position` (q, t, p) gives Phi and the entries of Phi_q that vary, whose places are `varying`;
+    `nu` (q, t, p) and `gamma` (q, q_dot, t, p) give the right sides, a row each. `factor` gives of
+    those entries what `solve` takes, and the determinants. `start` are all entries of Phi_q, of
+    which those that vary may be any.
+    """
+
+    sizes: Mapping[str, int]
+    tables: Mapping[str, Any]
+    kernels: Mapping[str, Callable[..., Any]]
+    varying: Sequence[int]
+    start: Array
+
+
+def on_numpy(mechanism: Mechanism) -> ModuleType:
+    """Return the text as a module that solves a mechanism: `march`, `march_variants`, structs."""
+    spec = importlib.util.find_spec("kincompile.solver.text")
+    assert spec is not None and spec.loader is not None  # noqa: PT018
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    kernels = _Kernels(mechanism)
+    own = {name: getattr(kernels, name) for name in (*vocabulary.KERNELS, "solve", "missed")}
+    vars(module).update(**mechanism.sizes, **mechanism.tables, **own)
+    for struct in vars(module).values():
+        if inspect.isclass(struct) and issubclass(struct, Struct):
+            struct.sizes = mechanism.sizes
+    return module
+
+
+class Real:
+    """A number that is the same for all lanes; likewise the other types, which annotate."""
+
+
+class Rows:
+    """Rows of numbers, whose last axis is the lane; likewise ``Row``, ``Vector``."""
+
+    def __class_getitem__(cls, size: object) -> type:
+        """Return the type for a size."""
+        return cls
+
+
+Int = Count = Bool = Lane = LaneInt = LaneBool = Table = Block = Real
+Row = Vector = Rows
+
+
+class Struct:
+    """A struct: to set one of its arrays is to fill it."""
+
+    sizes: Mapping[str, int] = {}  # of a mechanism, set with the text
+
+    def __init__(self, **given: Any) -> None:
+        for name, text in inspect.get_annotations(type(self)).items():
+            word, _, size = text.rstrip("]").partition("[")
+            kind = vocabulary.TYPES.get(word)
+            lanes = self.sizes["LANES"]
+            if word in ("Row", "Rows"):
+                own = (self.sizes[size],) if word == "Row" else (self.sizes[size], lanes)
+                vars(self)[name] = np.zeros(own)
+            elif kind is not None and kind.is_lane:
+                vars(self)[name] = np.zeros(lanes, BASES[kind.base])
+            else:
+                vars(self)[name] = 0.0
+        vars(self).update(given)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Fill an array, or set what is none."""
+        here = vars(self).get(name)
+        if isinstance(here, np.ndarray):
+            here[...] = value
+        else:
+            vars(self)[name] = value
+
+
+def _first(value: Any, lanes: int) -> Any:
+    """Return the first lanes of a struct or of a lane, not copied."""
+    if isinstance(value, Struct):
+        cut = object.__new__(type(value))
+        vars(cut).update({name: _first(part, lanes) for name, part in vars(value).items()})
+        return cut
+    return value[..., :lanes] if isinstance(value, np.ndarray) else value
+
+
+def lanewise(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Let a function that works on all lanes alike be called for the first of them."""
+    kinds = [str(x) for x in function.__annotations__.values()]
+
+    @functools.wraps(function)
+    def called(*arguments: Any, lanes: int | None = None) -> Any:
+        if lanes is not None:  # a vector that all lanes share is not cut
+            given = zip(arguments, kinds, strict=True)
+            arguments = tuple(x if kind == "Vector" else _first(x, lanes) for x, kind in given)
+        return function(*arguments)
+
+    return called
+
+
+class _Kernels:
+    """The kernels of a mechanism, as the text calls them."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism, self.own = mechanism, mechanism.kernels
+
+    def _fill(self, rows: Array, values: Any) -> None:
+        for row, value in zip(rows, values, strict=True):
+            row[:] = value
+
+    def position(self, b: Any, lanes: int | None = None) -> None:
+        """Evaluate Phi and Phi_q."""
+        b = b if lanes is None else _first(b, lanes)
+        values = self.own["position"](b.q, b.t, b.p)
+        m = len(b.Phi)
+        self._fill(b.Phi, values[:m])
+        for place, value in zip(self.mechanism.varying, values[m:], strict=True):
+            b.Phi_q[place] = value
+
+    def nu(self, b: Any) -> None:
+        """Evaluate nu."""
+        self._fill(b.nu, self.own["nu"](b.q, b.t, b.p))
+
+    def gamma(self, b: Any) -> None:
+        """Evaluate gamma."""
+        self._fill(b.gamma, self.own["gamma"](b.q, b.q_dot, b.t, b.p))
+
+    def factor(self, b: Any) -> None:
+        """Factor Phi_q."""
+        b.F, found = self.own["factor"]([b.Phi_q[place] for place in self.mechanism.varying])
+        self._fill(b.determinants, found)
+
+    def solve(self, b: Any, right: Array) -> Array:
+        """Return x of Phi_q x = right."""
+        x: Array = np.empty_like(b.q)
+        self._fill(x, self.own["solve"](b.F, list(right)))
+        return x
+
+    def missed(self, b: Any, weight: Array, by_velocity: Array, by_acceleration: Array) -> None:
+        """Find what velocity and acceleration miss of their equations."""
+        for right, x, total in ((b.nu, b.q_dot, by_velocity), (b.gamma, b.q_ddot, by_acceleration)):
+            rest = right.copy()
+            for entry, (i, j) in zip(b.Phi_q, self.mechanism.tables["PATTERN"], strict=True):
+                rest[i] -= entry * x[j]
+            total[:] = np.sum(weight * rest * rest, axis=0)
+
+    def constants(self, b: Any, lanes: int) -> None:
+        """Put the entries of Phi_q that never change in place."""
+        b.Phi_q[:, :lanes] = self.mechanism.start[:, np.newaxis]
+
+
+def take_up(at: Any, b: Any, k: int) -> None:
+    """Take up a lane as a good point."""
+    for name in vars(at):
+        setattr(at, name, vars(b)[name][..., k].copy())
+
+
+def put_at(b: Any, at: Any, first: int, end: int) -> None:
+    """Put lanes, from one to before another, at a good point."""
+    for name, value in vars(at).items():
+        vars(b)[name][..., first:end] = value[:, np.newaxis] if np.ndim(value) else value
+
+
+def keep(to: Any, b: Any) -> None:
+    """Keep points, with what was computed there."""
+    for name, value in vars(b).items():
+        setattr(to, name, value)
+
+
+def store(block: Array, rows: Array, time: int, first: int, count: int) -> None:
+    """Write the first lanes of rows into a block, at a time, from a variant on."""
+    block[:, time, first : first + count] = rows[:, :count]
+
+
+def part(vector: Array, first: int) -> Array:
+    """Return a vector from a place on, of as many lanes as its user has."""
+    return vector[first:]
+
+
+def any_lane(truth: Any) -> bool:
+    """Say whether a truth holds in any lane."""
+    return bool(np.any(truth))
+
+
+def rows(size: int) -> list[Any]:
+    """Return rows that are yet to be set."""
+    return [None] * size
+
+
+copied, where, finite, lanes = np.copy, np.where, np.isfinite, range
+NOTHING, INFINITE = np.nan, np.inf
+CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE, NOT_REACHED, LOCK_UP = vocabulary.STATUSES.values()
+
+# Until a mechanism gives its own:
+N = M = K = LANES = NONZEROS = BLOCKS = 0
+ANGULAR = IS_REDUNDANT = PROBE = PATTERN = ()
+position = factor = nu = gamma = constants = solve = missed = any_lane

@@ -1,0 +1,78 @@
+"""The text of the solver on NumPy, with the kernels of a compiled module."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import kincompile as kc
+from kincompile import criteria
+from kincompile.runtime.inputs import read_inputs
+from kincompile.runtime.problem import problem
+from kincompile.solver.words import Mechanism, on_numpy
+
+
+def mechanism_of(module, lanes):
+    """Return what the text must know of a module of NumPy, and how many points it takes at once."""
+    own, nonzeros = module.LANES, vars(module)["_PHI_Q_NONZEROS"]
+
+    def bound(kernel):
+        return lambda *states: own[kernel](module.ARRAYS, *states)
+
+    units = [module.UNITS[name] for name in module.COORDINATES]
+    columns = [range(first, first + count) for _, first, count in module.BODIES]
+    n, m = module.N_COORDINATES, module.N_EQUATIONS
+    kernels = {name: bound(name) for name in ("position", "nu", "gamma", "factor", "solve")}
+    with np.errstate(all="ignore"):
+        _, determinants = kernels["factor"]([np.ones(1)] * len(nonzeros.places))
+    return Mechanism(
+        sizes={
+            "N": n, "M": m, "K": len(module.PARAMETERS), "LANES": lanes,
+            "NONZEROS": len(module.PATTERN), "BLOCKS": len(determinants),
+        },
+        tables={
+            "ANGULAR": list(criteria.turning(units, columns)),
+            "IS_REDUNDANT": [False] * m,
+            "PROBE": criteria.probe_of(max(n, m)).tolist(),
+            "PATTERN": module.PATTERN.tolist(),
+        },
+        kernels=kernels,
+        varying=nonzeros.places,
+        start=nonzeros.start,
+    )  # fmt: skip
+
+
+def start_of(module, t):
+    """Return an assembled position at a time, and the size of the mechanism."""
+    q = kc.solve(module, [t]).q[0]
+    inputs = read_inputs(module, np.array([t]), None, None, criteria.TOLERANCE, 25)
+    return q, problem(module, inputs.p, q, t).size
+
+
+def marched(module, lanes, t, sets, *, together=False):
+    """March by the text: one motion, or those of parameter sets together.
+
+    Returns how many points, or sets, converged, and what was written: arrays whose last axis is
+    the time, or the set after the time.
+    """
+    text = on_numpy(mechanism_of(module, lanes))
+    guess, size = start_of(module, float(t[0]))
+    n, shape = module.N_COORDINATES, (t.size, len(sets)) if together else (1, t.size)
+    columns = np.transpose(sets) if together else np.repeat(np.transpose(sets), lanes, axis=1)
+    written = {name: np.full((n, *shape), np.nan) for name in ("q", "q_dot", "q_ddot")}
+    said = {name: np.zeros(shape[0] * shape[1], int) for name in ("status", "iterations")}
+    said["residual"] = np.full(shape[0] * shape[1], np.nan)
+    variants = text.Variants(
+        count=t.size, variants=len(sets) if together else 0, t=t, p=columns, guess=guess, size=size,
+        tolerance=criteria.TOLERANCE, max_iterations=25, **written, **said,
+    )  # fmt: skip
+    with np.errstate(all="ignore"):
+        reached = (text.march_variants if together else text.march)(variants)
+    rows = {name: array if together else array[:, 0] for name, array in written.items()}
+    return reached, SimpleNamespace(**rows, **said)
+
+
+@pytest.fixture(scope="session")
+def march():
+    """Return `marched`."""
+    return marched
