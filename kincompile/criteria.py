@@ -292,11 +292,21 @@ def turning(units: Iterable[str], bodies: Iterable[Sequence[int] | range]) -> li
         The columns of the coordinates of each body.
     """
     found = [unit == "rad" for unit in units]
-    for columns in bodies:
-        if len(columns) == SPATIAL_COORDINATES:
-            for column in columns[3:]:
-                found[column] = True
+    for cover in covers(bodies):
+        for column in cover:
+            found[column] = True
     return found
+
+
+def covers(bodies: Iterable[Sequence[int] | range]) -> list[Sequence[int]]:
+    """Return the columns of the Euler parameters of each body in space, of those of all bodies."""
+    return [columns[3:] for columns in bodies if len(columns) == SPATIAL_COORDINATES]
+
+
+def may_turn(units: Iterable[str], bodies: Iterable[Sequence[int] | range]) -> list[bool]:
+    """Return which coordinates are angles, or may be: free ones whose unit is not known."""
+    owned = {column for columns in bodies for column in columns}
+    return [unit == "rad" or not (unit or k in owned) for k, unit in enumerate(units)]
 
 
 def size_of(

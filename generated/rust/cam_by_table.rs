@@ -365,7 +365,8 @@ fn solve_at(F: &[f64; FACTORS], right: &[f64; N_EQUATIONS]) -> [f64; N_COORDINAT
 }
 
 // Which coordinates are angles, which equations repeat others; numbers of size 1/2 to 1 and either
-// sign without a pattern.
+// sign without a pattern; which coordinates are angles or may be; of each coordinate the first of
+// its body's Euler parameters, or N_COORDINATES.
 const ANGULAR: [bool; 7] = [
     false, false, true, false, false, true, true,
 ];
@@ -375,6 +376,12 @@ const IS_REDUNDANT: [bool; 7] = [
 const PROBE: [f64; 7] = [
     -0.8090169943749475, -0.6180339887498949, 0.9270509831248424, 0.7360679774997898,
     -0.5450849718747373, -0.8541019662496847, 0.6631189606246322,
+];
+const MAY_TURN: [bool; 7] = [
+    false, false, true, false, false, true, true,
+];
+const COVER: [usize; 7] = [
+    7, 7, 7, 7, 7, 7, 7,
 ];
 
 // By what a march judges, and what became of a point.
@@ -391,8 +398,29 @@ const SMALLEST_PART: f64 = 9.5367431640625e-07;
 const SMOOTH: f64 = 1e-09;
 const SOLVED: f64 = 1e-10;
 const TOO_NEAR: f64 = 100000.0;
+const AS_NEAR: f64 = 1.1;
+const ASTRAY: f64 = 5.0;
+const BEND: f64 = 0.01;
+const FAR: f64 = 0.7853981633974483;
+const FOLDED: f64 = 1e-09;
+const LARGEST_ANGLE: f64 = 0.5;
+const LONGEST_P: f64 = 2.0;
+const MIRROR_STEP: f64 = 1e-05;
+const MIRRORED: f64 = 2.0;
+const NEAR_ANGLE: f64 = 0.5235987755982988;
+const NEAR_PART: f64 = 0.1;
+const NUDGE: f64 = 0.3;
+const SAME_POSITION: f64 = 1e-06;
+const SETTLED: f64 = 0.5;
+const SHORTEST_STEP: f64 = 9.5367431640625e-07;
+const STEEP: f64 = 1000000.0;
+const SUFFICIENT: f64 = 0.0001;
+const THROWN: f64 = 10.0;
+const WILD: f64 = 1000.0;
 const MAX_CORRECTIONS: usize = 6;
 const MAX_SUBSTEPS: usize = 10000;
+const MOST_MIRRORED: usize = 300;
+const RESTARTS: usize = 4;
 pub const CONVERGED: usize = 0;
 pub const NOT_CONVERGED: usize = 1;
 pub const SINGULAR: usize = 2;
@@ -401,6 +429,10 @@ pub const NOT_REACHED: usize = 4;
 pub const LOCK_UP: usize = 7;
 const NOTHING: f64 = f64::NAN;
 const INFINITE: f64 = f64::INFINITY;
+const TURN: f64 = 2.0 * std::f64::consts::PI;
+/// Rows and columns of a matrix of least squares.
+const TALL: usize = N_EQUATIONS + N_COORDINATES;
+const WIDE: usize = N_COORDINATES + 1;
 /// Points that are worked on at once.
 const LANES: usize = 1;
 
@@ -442,7 +474,36 @@ pub struct Motion {
     pub iterations: Vec<usize>,
 }
 
-/// Follow the motion over times from a guess, for a size of the mechanism.
+/// Find a position at a time, from a guess that may be rough, for a size of the mechanism.
+///
+/// The size is that of a long lever arm, such as its largest link.
+pub fn assembled(
+    t: f64,
+    p: &[f64; N_PARAMETERS],
+    guess: &[f64; N_COORDINATES],
+    size: f64,
+) -> Option<[f64; N_COORDINATES]> {
+    let found = started(t, p, guess, size);
+    if found.status == CONVERGED {
+        Some(found.q)
+    } else {
+        None
+    }
+}
+
+fn started(
+    t: f64,
+    p: &[f64; N_PARAMETERS],
+    guess: &[f64; N_COORDINATES],
+    size: f64,
+) -> Attempt {
+    let (mut b, mut s, mut best) = (Point::new(), Start::new(), Attempt::new());
+    (b.p, s.t, s.tolerance) = (*p, t, 1e-10);
+    start(*guess, size, 25, &mut b, &mut s, &mut best);
+    best
+}
+
+/// Follow the motion over times from a guess, which may be rough, for a size of the mechanism.
 ///
 /// The size is that of a long lever arm, such as its largest link.
 pub fn motion(
@@ -455,12 +516,13 @@ pub fn motion(
     let (q, q_dot, q_ddot, residual) = (numbers(), numbers(), numbers(), vec![NOTHING; t.len()]);
     let (status, iterations) = (vec![NOT_REACHED; t.len()], vec![0; t.len()]);
     let mut found = Motion { reached: 0, q, q_dot, q_ddot, residual, status, iterations };
+    let first = started(t[0], p, guess, size);
     found.reached = march(&mut Variants {
         count: t.len(),
         variants: 0,
         t,
         p,
-        guess,
+        guess: &first.q,
         size,
         tolerance: 1e-10,
         max_iterations: 25,
@@ -471,7 +533,18 @@ pub fn motion(
         status: &mut found.status,
         iterations: &mut found.iterations,
     });
+    found.iterations[0] = first.iterations;
     found
+}
+
+// A number with 24 bits.
+fn single(x: f64) -> f64 {
+    let near = x as f32 as f64;
+    if (near - x).abs() <= x.abs() / 16777216.0 {
+        near
+    } else {
+        x
+    }
 }
 
 // Take up a point as a good one, and the other way.
@@ -498,6 +571,760 @@ fn missed_at(at: &Point, weight: &[f64; N_EQUATIONS]) -> (f64, f64) {
         totals.1 += weight[i] * second[i] * second[i];
     }
     totals
+}
+
+/// By what positions around a guess are judged, and numbers that are worked on.
+struct Start {
+    t: f64,
+    tolerance: f64,
+    // the guess, with angles turned as the equations show that it is meant
+    meant: [f64; N_COORDINATES],
+    // scale of each coordinate
+    reference: [f64; N_COORDINATES],
+    // how far each may be from an assembly that it is near
+    near: [f64; N_COORDINATES],
+    // how large it is in the guess
+    place: [f64; N_COORDINATES],
+    // correction, in scales, below which there are only rounding errors
+    floor: f64,
+    // what the terms of each equation contribute at a generic position
+    magnitude: [f64; N_EQUATIONS],
+    // what rounding errors of the coordinates leave of each equation
+    noise: [f64; N_EQUATIONS],
+    // what its terms contribute at most, wherever they are
+    limit: [f64; N_EQUATIONS],
+    // what they contribute at a point
+    terms: [f64; N_EQUATIONS],
+    step: [f64; N_COORDINATES],
+    way: [f64; N_COORDINATES],
+    // of equations, the last column their right side
+    matrix: Vec<[f64; WIDE]>,
+    directions: Vec<[f64; WIDE]>,
+}
+
+impl Start {
+    fn new() -> Self {
+        Self {
+            t: 0.0,
+            tolerance: 0.0,
+            meant: [0.0; N_COORDINATES],
+            reference: [0.0; N_COORDINATES],
+            near: [0.0; N_COORDINATES],
+            place: [0.0; N_COORDINATES],
+            floor: 0.0,
+            magnitude: [0.0; N_EQUATIONS],
+            noise: [0.0; N_EQUATIONS],
+            limit: [0.0; N_EQUATIONS],
+            terms: [0.0; N_EQUATIONS],
+            step: [0.0; N_COORDINATES],
+            way: [0.0; N_COORDINATES],
+            matrix: vec![[0.0; WIDE]; TALL],
+            directions: vec![[0.0; WIDE]; WIDE],
+        }
+    }
+}
+
+/// A run of Newton's method, and by what it is compared with others.
+struct Attempt {
+    status: usize,
+    iterations: usize,
+    // whether it went so far that rounding errors decide where it ends
+    is_thrown: bool,
+    // the last position
+    q: [f64; N_COORDINATES],
+    // the position after the first correction
+    first: [f64; N_COORDINATES],
+    // from the guess, in millionths of what is near, up to there
+    away: f64,
+    // 2 far from the guess, 1 on another branch than it shows, 0 as it is meant
+    rank: usize,
+    // distance from the guess, in millionths of the scales
+    far: f64,
+}
+
+impl Attempt {
+    fn new() -> Self {
+        Self {
+            status: 0,
+            iterations: 0,
+            is_thrown: false,
+            q: [0.0; N_COORDINATES],
+            first: [0.0; N_COORDINATES],
+            away: 0.0,
+            rank: 0,
+            far: 0.0,
+        }
+    }
+}
+
+/// Give the Euler parameters of the guess a length near one: any length is an orientation. By their
+/// largest first, since the squares of large ones overflow.
+fn orient(s: &mut Start) {
+    for i in 0..N_COORDINATES {
+        if COVER[i] == i {
+            let mut most: f64 = 0.0;
+            let mut total: f64 = 0.0;
+            for k in 0..4 {
+                most = if s.meant[i + k].abs() > most { s.meant[i + k].abs() } else { most };
+            }
+            for k in 0..4 {
+                let part = s.meant[i + k] / most;
+                total += part * part;
+            }
+            let rest = total.sqrt();
+            if most * rest > LONGEST_P || most * rest < 1.0 / LONGEST_P {
+                for k in 0..4 {
+                    s.meant[i + k] = s.meant[i + k] / most / rest;
+                }
+            }
+        }
+    }
+}
+
+/// Evaluate the equations at a position; return whether they have values there.
+fn place_at(q: [f64; N_COORDINATES], t: f64, b: &mut Point) -> bool {
+    let mut total: f64 = 0.0;
+    b.t = t;
+    for i in 0..N_COORDINATES {
+        b.q[i] = q[i];
+    }
+    position_at(b);
+    for i in 0..N_EQUATIONS {
+        total += b.Phi[i];
+    }
+    return total.is_finite();
+}
+
+/// Find what the terms of each equation contribute at scales of the coordinates.
+fn find_terms(scale: [f64; N_COORDINATES], b: &Point, s: &mut Start) {
+    s.terms = [0.0; N_EQUATIONS];
+    for e in 0..NONZEROS {
+        let i = PATTERN[e][0];
+        let j = PATTERN[e][1];
+        s.terms[i] += b.Phi_q[e].abs() * scale[j];
+    }
+    for i in 0..N_EQUATIONS {
+        let most = if s.terms[i] <= s.limit[i] { s.terms[i] } else { s.limit[i] };
+        s.terms[i] = if most > s.magnitude[i] { most } else { s.magnitude[i] };
+    }
+}
+
+/// Find by what positions around one are judged.
+fn judge_around(q: [f64; N_COORDINATES], size: f64, b: &mut Point, s: &mut Start) {
+    let mut generic = [0.0; N_COORDINATES];
+    let mut wide = [0.0; N_COORDINATES];
+    let mut farthest: f64 = 0.0;
+    for i in 0..N_COORDINATES {
+        s.reference[i] = if ANGULAR[i] { 1.0 } else { size };
+        s.near[i] = if ANGULAR[i] { NEAR_ANGLE } else { NEAR_PART * size };
+        s.place[i] = q[i].abs();
+        generic[i] = q[i] + s.reference[i] * PROBE[i];
+        wide[i] = s.reference[i] + s.place[i];
+        if !ANGULAR[i] && s.place[i] > farthest {
+            farthest = s.place[i];
+        }
+    }
+    s.floor = ROUNDING * farthest / size;
+    s.magnitude = [0.0; N_EQUATIONS];
+    s.noise = [0.0; N_EQUATIONS];
+    for i in 0..N_EQUATIONS {
+        s.limit[i] = INFINITE;
+    }
+    if place_at(generic, s.t, b) {
+        find_terms(wide, b, s);
+        for i in 0..N_EQUATIONS {
+            s.noise[i] = ROUNDING * s.terms[i];
+        }
+        find_terms(s.reference, b, s);
+        for i in 0..N_EQUATIONS {
+            // With 24 bits: rounding errors do not show in what is judged by it.
+            s.magnitude[i] = single(s.terms[i]);
+            s.limit[i] = if s.noise[i] > 0.0 { STEEP / ROUNDING * s.noise[i] } else { INFINITE };
+        }
+    }
+}
+
+/// Return whether every equation holds, relative to what its terms contribute.
+fn holds(b: &Point, s: &mut Start) -> bool {
+    find_terms(s.reference, b, s);
+    for i in 0..N_EQUATIONS {
+        if !(b.Phi[i].abs() <= RESIDUAL_FACTOR * s.tolerance * s.terms[i] + s.noise[i]) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Return whether every equation holds as well as floating point permits.
+fn holds_to_rounding(b: &Point, s: &mut Start) -> bool {
+    let mut scale = [0.0; N_COORDINATES];
+    for i in 0..N_COORDINATES {
+        let mut size = b.q[i].abs();
+        let most = WILD * s.reference[i] + s.place[i];
+        size = if size > s.reference[i] { size } else { s.reference[i] };
+        scale[i] = if size < most { size } else { most };
+    }
+    find_terms(scale, b, s);
+    for i in 0..N_EQUATIONS {
+        if !(b.Phi[i].abs() <= ROUNDING * s.terms[i]) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Return by how much all equations are missed, relative to terms.
+fn residual(terms: [f64; N_EQUATIONS], b: &Point) -> f64 {
+    let mut total: f64 = 0.0;
+    for i in 0..N_EQUATIONS {
+        let part = b.Phi[i] / (if terms[i] > 0.0 { terms[i] } else { 1.0 });
+        total += part * part;
+    }
+    return total.sqrt();
+}
+
+/// Fill the matrix with Phi_q and the right side -Phi, in scales and relative to terms.
+fn fill_matrix(scale: [f64; N_COORDINATES], terms: [f64; N_EQUATIONS], b: &Point, s: &mut Start) {
+    s.matrix.fill([0.0; WIDE]);
+    for e in 0..NONZEROS {
+        let i = PATTERN[e][0];
+        let j = PATTERN[e][1];
+        s.matrix[i][j] = b.Phi_q[e] * scale[j] / (if terms[i] > 0.0 { terms[i] } else { 1.0 });
+    }
+    for i in 0..N_EQUATIONS {
+        s.matrix[i][N_COORDINATES] = -b.Phi[i] / (if terms[i] > 0.0 { terms[i] } else { 1.0 });
+    }
+}
+
+/// Find the step by which so many rows miss least (Householder); return whether there is one.
+fn solve_least(s: &mut Start, count: usize) -> bool {
+    let mut total: f64 = 0.0;
+    for k in 0..N_COORDINATES {
+        let mut square: f64 = 0.0;
+        for i in k..count {
+            square += s.matrix[i][k] * s.matrix[i][k];
+        }
+        if square == 0.0 {
+            // Nothing depends on it: the shortest step leaves it.
+            s.matrix[k][k] = INFINITE;
+        } else {
+            let size = if s.matrix[k][k] > 0.0 { -square.sqrt() } else { square.sqrt() };
+            let head = s.matrix[k][k] - size;
+            for j in k + 1..WIDE {
+                let mut dot = head * s.matrix[k][j];
+                for i in k + 1..count {
+                    dot += s.matrix[i][k] * s.matrix[i][j];
+                }
+                dot = dot / (-size * head);
+                s.matrix[k][j] -= dot * head;
+                for i in k + 1..count {
+                    s.matrix[i][j] -= dot * s.matrix[i][k];
+                }
+            }
+            s.matrix[k][k] = size;
+        }
+    }
+    for n in 0..N_COORDINATES {
+        let k = N_COORDINATES - 1 - n;
+        let mut value = s.matrix[k][N_COORDINATES];
+        for j in k + 1..N_COORDINATES {
+            value -= s.matrix[k][j] * s.step[j];
+        }
+        s.step[k] = value / s.matrix[k][k];
+        total += s.step[k].abs();
+    }
+    return total.is_finite();
+}
+
+/// Apply the whole correction to a position; return CONVERGED, or why there is none.
+fn plain_step(q: [f64; N_COORDINATES], b: &mut Point, s: &mut Start) -> usize {
+    let mut trial = [0.0; N_COORDINATES];
+    for i in 0..N_COORDINATES {
+        trial[i] = 1.0;
+    }
+    for i in 0..N_EQUATIONS {
+        s.terms[i] = 1.0;
+    }
+    fill_matrix(trial, s.terms, b, s);
+    if !solve_least(s, N_EQUATIONS) {
+        return SINGULAR;
+    }
+    for i in 0..N_COORDINATES {
+        trial[i] = q[i] + s.step[i];
+    }
+    return if place_at(trial, s.t, b) { CONVERGED } else { NOT_FINITE };
+}
+
+/// Apply as much of the correction as keeps the angles near and lowers the residual. It is bent
+/// towards the gradient while the residual is large (Levenberg, Marquardt).
+fn safeguarded_step(q: [f64; N_COORDINATES], b: &mut Point, s: &mut Start) -> usize {
+    let mut trial = [0.0; N_COORDINATES];
+    find_terms(s.reference, b, s);
+    let mut terms = s.terms;
+    let before = residual(terms, b);
+    fill_matrix(s.reference, terms, b, s);
+    for i in 0..N_COORDINATES {
+        s.matrix[N_EQUATIONS
+                + i][i] = (BEND * (if before < 1.0 { before } else { 1.0 })).sqrt();
+    }
+    if !solve_least(s, N_EQUATIONS + N_COORDINATES) {
+        return NOT_FINITE;
+    }
+    let mut excess: f64 = 1.0;
+    for i in 0..N_COORDINATES {
+        let part = s.step[i].abs() / (if ANGULAR[i] { LARGEST_ANGLE } else { 1.0 });
+        excess = if part > excess { part } else { excess };
+        s.step[i] *= s.reference[i];
+    }
+    let mut part = 1.0 / excess;
+    while part >= SHORTEST_STEP {
+        for i in 0..N_COORDINATES {
+            trial[i] = q[i] + part * s.step[i];
+        }
+        if place_at(trial, s.t, b) {
+            let after = residual(terms, b);
+            if after <= (1.0 - SUFFICIENT * part) * before || after <= ROUNDING {
+                return CONVERGED;
+            }
+        }
+        part *= 0.5;
+    }
+    return NOT_CONVERGED;
+}
+
+/// Run Newton's method from a guess, by safeguarded steps or by plain ones.
+fn iterate(guess: [f64; N_COORDINATES], is_safe: bool, most: usize, b: &mut Point, s: &mut Start, a:
+    &mut Attempt) {
+    let mut size: f64 = 0.0;
+    let mut is_crawling = false;
+    a.iterations = 0;
+    a.is_thrown = false;
+    a.q = guess;
+    a.first = guess;
+    a.status = if place_at(guess, s.t, b) { NOT_CONVERGED } else { NOT_FINITE };
+    let mut is_going = a.status == NOT_CONVERGED;
+    while is_going && a.iterations < most {
+        let moved = if is_safe { safeguarded_step(a.q, b, s) } else { plain_step(a.q, b, s) };
+        if moved != CONVERGED {
+            a.status = moved;
+            is_going = false;
+        } else {
+            let mut is_small = true;
+            let last = size;
+            size = 0.0;
+            for i in 0..N_COORDINATES {
+                let change = b.q[i] - a.q[i];
+                let mut allowed = if s.tolerance > s.floor { s.tolerance } else { s.floor };
+                allowed = allowed * s.reference[i] + ROUNDING * b.q[i].abs();
+                is_small = is_small && change.abs() <= allowed;
+                size += change * change;
+                a.q[i] = b.q[i];
+                if !((a.q[i] - guess[i]).abs() <= THROWN * s.near[i]) {
+                    a.is_thrown = true;
+                }
+            }
+            size = size.sqrt();
+            a.iterations += 1;
+            is_crawling = a.iterations > 1 && size > last / 4.0;
+            if a.iterations == 1 {
+                a.first = a.q;
+            }
+            let mut has_ended = is_small && holds(b, s);
+            if !has_ended && (is_small || is_crawling) {
+                has_ended = holds_to_rounding(b, s);
+            }
+            if has_ended {
+                a.status = CONVERGED;
+                is_going = false;
+            }
+        }
+    }
+    if is_going && is_crawling && holds(b, s) {
+        a.status = SINGULAR;
+    }
+}
+
+/// Find the way from a guess to a position as a mechanism shows it. Whole turns of an angle are no
+/// way, and Euler parameters p and -p are one orientation.
+fn find_way(q: [f64; N_COORDINATES], guess: [f64; N_COORDINATES], s: &mut Start) {
+    for i in 0..N_COORDINATES {
+        let change = q[i] - guess[i];
+        s.way[i] = if ANGULAR[i] { change
+            - TURN * (change / TURN + 0.5).floor() } else { change };
+    }
+    for i in 0..N_COORDINATES {
+        if COVER[i] == i {
+            let mut along: f64 = 0.0;
+            for k in 0..4 {
+                along += q[i + k] * guess[i + k];
+            }
+            for k in 0..4 {
+                let both = q[i + k] + guess[i + k];
+                s.way[i + k] = if along < 0.0 { both } else { q[i + k] - guess[i + k] };
+            }
+        }
+    }
+}
+
+/// Return how far a position is from a guess; up to 1.0 it is near.
+fn away_from(q: [f64; N_COORDINATES], guess: [f64; N_COORDINATES], s: &mut Start) -> f64 {
+    let mut most: f64 = 0.0;
+    find_way(q, guess, s);
+    for i in 0..N_COORDINATES {
+        let part = s.way[i].abs() / s.near[i];
+        most = if part <= most { most } else { part };
+    }
+    return most;
+}
+
+/// Turn angles of the guess by whole turns towards its first correction; return whether any was.
+/// Only those count that the equations do not leave free by whole turns, as driven ones, and only
+/// where the equations miss less then: a step of a whole turn throws all the others far.
+fn turn(first: [f64; N_COORDINATES], b: &mut Point, s: &mut Start) -> bool {
+    let mut Phi = [0.0; N_EQUATIONS];
+    let mut turns = [0.0; N_COORDINATES];
+    let mut trial = s.meant;
+    let mut is_turned = false;
+    if !place_at(s.meant, s.t, b) {
+        return false;
+    }
+    let mut missed_least = residual(s.magnitude, b);
+    for i in 0..N_EQUATIONS {
+        Phi[i] = b.Phi[i];
+    }
+    for i in 0..N_COORDINATES {
+        turns[i] = if ANGULAR[i] { ((first[i] - s.meant[i]) / TURN
+                + 0.5).floor() } else { 0.0 };
+        if turns[i] != 0.0 {
+            trial[i] += TURN;
+            if place_at(trial, s.t, b) {
+                for k in 0..N_EQUATIONS {
+                    b.Phi[k] -= Phi[k];
+                }
+                if residual(s.magnitude, b) <= SAME_POSITION {
+                    turns[i] = 0.0;
+                }
+            }
+            trial[i] = s.meant[i];
+        }
+    }
+    // Together first, then each alone.
+    for n in 0..N_COORDINATES + 1 {
+        let mut is_new = false;
+        trial = s.meant;
+        for i in 0..N_COORDINATES {
+            if turns[i] != 0.0 && (n == 0 || n == i + 1) {
+                trial[i] += TURN * turns[i];
+                is_new = true;
+            }
+        }
+        if is_new && place_at(trial, s.t, b) {
+            let missed_now = residual(s.magnitude, b);
+            if missed_now < (1.0 - SUFFICIENT) * missed_least {
+                missed_least = missed_now;
+                is_turned = true;
+                for i in 0..N_COORDINATES {
+                    if n == 0 || n == i + 1 {
+                        turns[i] = 0.0;
+                    }
+                }
+                s.meant = trial;
+            }
+        }
+    }
+    return is_turned;
+}
+
+/// Turn angles by whole turns towards a guess, and Euler parameters to its signs. As far as the
+/// equations allow it. Parameters that are as far from it either way become those whose largest is
+/// positive.
+fn unwind(guess: [f64; N_COORDINATES], b: &mut Point, s: &mut Start, a: &mut Attempt, other: &mut
+    Attempt) {
+    // Together first: angles that a gear or a driver connects turn together.
+    for n in 0..N_COORDINATES + 1 {
+        let mut is_new = false;
+        let mut trial = a.q;
+        for i in 0..N_COORDINATES {
+            let is_wound = MAY_TURN[i] && (trial[i] - guess[i]).abs() > 0.5 * TURN;
+            if is_wound && (n == 0 || n == i + 1) {
+                trial[i] -= TURN * ((trial[i] - guess[i]) / TURN + 0.5).floor();
+                is_new = true;
+            }
+        }
+        if is_new {
+            iterate(trial, false, MAX_CORRECTIONS, b, s, other);
+            let mut is_same = other.status == CONVERGED;
+            for i in 0..N_COORDINATES {
+                is_same = is_same
+                    && (other.q[i] - trial[i]).abs() <= SAME_POSITION * s.reference[i];
+            }
+            if is_same {
+                a.q = other.q;
+            }
+        }
+    }
+    for i in 0..N_COORDINATES {
+        if COVER[i] == i {
+            let mut along: f64 = 0.0;
+            let mut most: f64 = 0.0;
+            let mut trial = a.q;
+            for k in 0..4 {
+                let p = a.q[i + k];
+                along += p * guess[i + k];
+                most = if p.abs() > most.abs() { p } else { most };
+                trial[i + k] = -p;
+            }
+            let is_turned = (if along.abs() > SAME_POSITION { along } else { most }) < 0.0;
+            if is_turned && place_at(trial, s.t, b) && holds(b, s) {
+                a.q = trial;
+            }
+        }
+    }
+}
+
+/// Return whether the guess shows a branch, and a position found from it lies on another. Nothing
+/// but the rows that are solved has a determinant where others repeat them.
+fn leaves_branch(q: [f64; N_COORDINATES], b: &mut Point, s: &Start) -> bool {
+    let mut shown = [0.0; BLOCKS];
+    let mut leaves = false;
+    for i in 0..N_EQUATIONS {
+        if IS_REDUNDANT[i] {
+            return false;
+        }
+    }
+    if !place_at(s.meant, s.t, b) {
+        return false;
+    }
+    factor_at(b);
+    for i in 0..BLOCKS {
+        shown[i] = b.determinants[i];
+    }
+    if !place_at(q, s.t, b) {
+        return true;
+    }
+    factor_at(b);
+    for i in 0..BLOCKS {
+        let here = b.determinants[i];
+        if !(shown[i].abs() > FOLDED * here.abs()) {
+            return false;
+        }
+        leaves = leaves || !(if shown[i] > 0.0 { here > 0.0 } else { here < 0.0 });
+    }
+    return leaves;
+}
+
+/// Take an attempt that converged as the best one, where it is nearer to what a guess means. What
+/// is near the guess comes first, the nearest of it; then what is not far, then what is on its
+/// branch, then the nearer.
+fn take(b: &mut Point, s: &mut Start, a: &mut Attempt, other: &mut Attempt, best: &mut Attempt) {
+    unwind(s.meant, b, s, a, other);
+    let away = away_from(a.q, s.meant, s);
+    let mut is_far = false;
+    a.far = 0.0;
+    for i in 0..N_COORDINATES {
+        let size = s.way[i].abs();
+        is_far = is_far || (MAY_TURN[i] && size > FAR);
+        a.far = if size / s.reference[i] > a.far { size / s.reference[i] } else { a.far };
+    }
+    a.far = (1000000.0 * a.far + 0.5).floor();
+    a.away = (1000000.0 * (if away < 1.0 { away } else { 1.0 }) + 0.5).floor();
+    a.rank = 2;
+    if !is_far {
+        a.rank = if leaves_branch(a.q, b, s) { 1 } else { 0 };
+    }
+    let mut is_better = a.far < best.far;
+    if best.status != CONVERGED {
+        is_better = true;
+    } else if a.away != best.away {
+        is_better = a.away < best.away;
+    } else if a.rank != best.rank {
+        is_better = a.rank < best.rank;
+    }
+    if is_better {
+        best.status = a.status;
+        best.iterations = a.iterations;
+        best.q = a.q;
+        best.away = a.away;
+        best.rank = a.rank;
+        best.far = a.far;
+    }
+}
+
+/// Find about where the mechanism can be assembled beyond the nearest singular position. Along its
+/// movement v the smallest singular value u^T Phi_q v falls to zero half way. The position is left
+/// in the step. Return whether there is one; a large mechanism is not asked.
+fn other_side(q: [f64; N_COORDINATES], b: &mut Point, s: &mut Start) -> bool {
+    if N_COORDINATES > MOST_MIRRORED || !place_at(q, s.t, b) {
+        return false;
+    }
+    let mut trial = [0.0; N_COORDINATES];
+    let mut image = [0.0; N_EQUATIONS];
+    fill_matrix(s.near, s.magnitude, b, s);
+    s.directions.fill([0.0; WIDE]);
+    for i in 0..N_COORDINATES {
+        s.directions[i][i] = 1.0;
+    }
+    let mut is_done = false;
+    let mut sweeps = 0;
+    // Rotations of pairs of columns until all are orthogonal (Jacobi).
+    while !is_done && sweeps < 60 {
+        is_done = true;
+        sweeps += 1;
+        for i in 0..N_COORDINATES {
+            for j in i + 1..N_COORDINATES {
+                let mut first: f64 = 0.0;
+                let mut second: f64 = 0.0;
+                let mut mixed: f64 = 0.0;
+                for k in 0..N_EQUATIONS {
+                    first += s.matrix[k][i] * s.matrix[k][i];
+                    second += s.matrix[k][j] * s.matrix[k][j];
+                    mixed += s.matrix[k][i] * s.matrix[k][j];
+                }
+                if mixed.abs() > ROUNDING / 16.0 * (first * second).sqrt() {
+                    is_done = false;
+                    let zeta = (second - first) / (2.0 * mixed);
+                    let mut tangent = 1.0 / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
+                    tangent = if zeta >= 0.0 { tangent } else { -tangent };
+                    let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
+                    for k in 0..N_EQUATIONS {
+                        let x = s.matrix[k][i];
+                        let y = s.matrix[k][j];
+                        s.matrix[k][i] = cosine * (x - tangent * y);
+                        s.matrix[k][j] = cosine * (tangent * x + y);
+                    }
+                    for k in 0..N_COORDINATES {
+                        let x = s.directions[k][i];
+                        let y = s.directions[k][j];
+                        s.directions[k][i] = cosine * (x - tangent * y);
+                        s.directions[k][j] = cosine * (tangent * x + y);
+                    }
+                }
+            }
+        }
+    }
+    let mut smallest = 0;
+    let mut least: f64 = INFINITE;
+    for i in 0..N_COORDINATES {
+        let mut square: f64 = 0.0;
+        for k in 0..N_EQUATIONS {
+            square += s.matrix[k][i] * s.matrix[k][i];
+        }
+        if square < least {
+            least = square;
+            smallest = i;
+        }
+    }
+    for i in 0..N_EQUATIONS {
+        image[i] = s.matrix[i][smallest];
+    }
+    for i in 0..N_COORDINATES {
+        s.way[i] = s.near[i] * s.directions[i][smallest];
+        trial[i] = q[i] + MIRROR_STEP * s.way[i];
+    }
+    if !place_at(trial, s.t, b) {
+        return false;
+    }
+    let mut bend: f64 = 0.0;
+    for e in 0..NONZEROS {
+        let i = PATTERN[e][0];
+        let size = if s.magnitude[i] > 0.0 { s.magnitude[i] } else { 1.0 };
+        bend += image[i] * b.Phi_q[e] / size * s.way[PATTERN[e][1]];
+    }
+    let mut total: f64 = 0.0;
+    bend = (bend - least) / MIRROR_STEP;
+    for i in 0..N_COORDINATES {
+        s.step[i] = q[i] - 2.0 * least / bend * s.way[i];
+        total += s.step[i];
+    }
+    return total.is_finite();
+}
+
+/// Return whether an attempt led to an assembly so near that no nearer one is sought.
+fn is_settled(s: &Start, a: &Attempt) -> bool {
+    for i in 0..N_COORDINATES {
+        if !((a.q[i] - s.meant[i]).abs() <= SETTLED * s.near[i]) {
+            return false;
+        }
+    }
+    return a.status == CONVERGED;
+}
+
+/// Make safeguarded attempts until one converges: from the guess, then further and further away.
+/// With all bodies on a line no equation tells which way to bend. Where a position was found
+/// already, one is enough.
+fn rescue(is_sound: bool, most: usize, b: &mut Point, s: &mut Start, a: &mut Attempt) {
+    let mut begin = [0.0; N_COORDINATES];
+    let mut reach: f64 = 0.0;
+    for k in 0..if is_sound { 1 } else { RESTARTS + 1 } {
+        for i in 0..N_COORDINATES {
+            let place = if i + 1 >= k { i + 1 - k } else { N_EQUATIONS + i + 1 - k };
+            begin[i] = s.meant[i];
+            if k > 0 {
+                begin[i] += reach * s.reference[i] * PROBE[place];
+            }
+        }
+        iterate(begin, true, most, b, s, a);
+        if a.status == CONVERGED {
+            break;
+        }
+        reach += NUDGE;
+    }
+}
+
+/// Find a position from a guess, or why there is none.
+fn start(guess: [f64; N_COORDINATES], size: f64, most: usize, b: &mut Point, s: &mut Start, best:
+    &mut Attempt) {
+    let mut plain = Attempt::new();
+    let mut a = Attempt::new();
+    let mut other = Attempt::new();
+    s.meant = guess;
+    orient(s);
+    let mut near = s.meant;
+    judge_around(near, size, b, s);
+    best.status = NOT_FINITE;
+    best.q = near;
+    if place_at(near, s.t, b) {
+        best.status = NOT_CONVERGED;
+        iterate(s.meant, false, most, b, s, &mut plain);
+        while !is_settled(s, &plain) && turn(plain.first, b, s) {
+            iterate(s.meant, false, most, b, s, &mut plain);
+        }
+        let is_near = is_settled(s, &plain);
+        let is_sound = plain.status == CONVERGED && !plain.is_thrown;
+        if is_near || is_sound {
+            take(b, s, &mut plain, &mut other, best);
+        }
+        let mut is_astray = !is_near && best.status != CONVERGED;
+        if is_sound && !is_near {
+            is_astray = best.rank > 0 || away_from(best.q, s.meant, s) > ASTRAY;
+        }
+        if is_astray {
+            rescue(is_sound, most, b, s, &mut a);
+            if a.status == CONVERGED {
+                take(b, s, &mut a, &mut other, best);
+            } else if plain.status == CONVERGED && !is_sound {
+                take(b, s, &mut plain, &mut other, best);
+            } else if !is_sound {
+                best.status = a.status;
+            }
+        }
+        if !is_near && best.status == CONVERGED && other_side(best.q, b, s) {
+            let mut opposite = s.step;
+            let mut away = away_from(best.q, s.meant, s);
+            away = if away > 1.0 { away } else { 1.0 };
+            let reach = if AS_NEAR * away < MIRRORED { AS_NEAR * away } else { MIRRORED };
+            if away_from(opposite, s.meant, s) <= MIRRORED * away {
+                iterate(opposite, false, most, b, s, &mut a);
+                let is_good = a.status == CONVERGED && !a.is_thrown;
+                if is_good && away_from(a.q, s.meant, s) <= reach {
+                    take(b, s, &mut a, &mut other, best);
+                }
+            }
+        }
+        if best.status == CONVERGED {
+            unwind(near, b, s, best, &mut other);
+        }
+    }
 }
 
 /// A good point of a motion.
@@ -579,7 +1406,7 @@ impl Outcome {
 
 /// Measure the equations of a mechanism around positions, which stay as they are.
 fn measure(b: &mut Point, size: f64, s: &mut Scales) {
-    let q = b.q;
+    let mut q = b.q;
     for i in 0..N_COORDINATES {
         s.reference[i] = if ANGULAR[i] { 1.0 } else { size };
         s.inverse[i] = 1.0 / s.reference[i];
@@ -591,13 +1418,13 @@ fn measure(b: &mut Point, size: f64, s: &mut Scales) {
     for e in 0..NONZEROS {
         let i = PATTERN[e][0];
         let j = PATTERN[e][1];
-        let slope = b.Phi_q[e].abs();
+        let mut slope = b.Phi_q[e].abs();
         s.magnitude[i] += slope * s.reference[j];
         s.noise[i] += ROUNDING * slope * (s.reference[j] + q[j].abs());
     }
     for i in 0..N_EQUATIONS {
         let allowed = if IS_REDUNDANT[i] { AGREEMENT } else { SOLVED };
-        let terms = allowed * s.magnitude[i];
+        let mut terms = allowed * s.magnitude[i];
         s.weight[i] = 1.0 / (terms * allowed * s.magnitude[i]);
     }
     b.q = q;
@@ -615,10 +1442,10 @@ fn correct(b: &mut Point, s: &Scales, most: usize, o: &mut Outcome) {
         let mut is_large = false;
         position_at(b);
         factor_at(b);
-        let change = solve_at(&b.F, &b.Phi);
+        let mut change = solve_at(&b.F, &b.Phi);
         for i in 0..N_COORDINATES {
             b.q[i] -= if going { change[i] } else { 0.0 };
-            let allowed = s.tolerance * s.reference[i] + ROUNDING * b.q[i].abs();
+            let mut allowed = s.tolerance * s.reference[i] + ROUNDING * b.q[i].abs();
             is_large = is_large || !(change[i].abs() <= allowed);
         }
         iterations += going as usize;
@@ -635,36 +1462,36 @@ fn correct(b: &mut Point, s: &Scales, most: usize, o: &mut Outcome) {
 fn complete(b: &mut Point, s: &Scales, o: &mut Outcome) {
     let mut right = [0.0; N_EQUATIONS];
     let mut is_off = false;
-    let mut speed = 0.0;
-    let mut gain = 0.0;
+    let mut speed: f64 = 0.0;
+    let mut gain: f64 = 0.0;
     position_at(b);
     factor_at(b);
     o.residual = 0.0;
     o.sensitivity = 0.0;
     let terms = (RESIDUAL_FACTOR * s.tolerance).max(ROUNDING);
     for i in 0..N_EQUATIONS {
-        let allowed = terms * s.magnitude[i] + s.noise[i];
-        let size = b.Phi[i].abs();
+        let mut allowed = terms * s.magnitude[i] + s.noise[i];
+        let mut size = b.Phi[i].abs();
         o.residual = if size > o.residual { size } else { o.residual };
         is_off = is_off || !(size <= allowed);
         right[i] = s.magnitude[i] * PROBE[i];
     }
     // A third right side, of the size of the equations' terms, shows how near to singular Phi_q is.
-    let answer = solve_at(&b.F, &right);
+    let mut answer = solve_at(&b.F, &right);
     nu_at(b);
     b.q_dot = solve_at(&b.F, &b.nu);
     gamma_at(b);
     b.q_ddot = solve_at(&b.F, &b.gamma);
     for i in 0..N_COORDINATES {
-        let moved = answer[i].abs() * s.inverse[i];
+        let mut moved = answer[i].abs() * s.inverse[i];
         o.sensitivity = if moved <= o.sensitivity { o.sensitivity } else { moved };
         speed += b.q_dot[i].abs() * s.inverse[i];
         gain += b.q_ddot[i].abs() * s.inverse[i];
     }
     (o.by_velocity, o.by_acceleration) = missed_at(b, &s.weight);
-    let first = speed * speed;
-    let second = (gain + first) * (gain + first);
-    let is_met = o.by_velocity <= first && o.by_acceleration <= second;
+    let mut first = speed * speed;
+    let mut second = (gain + first) * (gain + first);
+    let mut is_met = o.by_velocity <= first && o.by_acceleration <= second;
     let mut found = if is_met { CONVERGED } else { SINGULAR };
     found = if (first + second).is_finite() { found } else { NOT_FINITE };
     found = if o.sensitivity <= TOO_NEAR { found } else { SINGULAR };
@@ -678,38 +1505,38 @@ fn complete(b: &mut Point, s: &Scales, o: &mut Outcome) {
 /// sign, a singular configuration lies between; near one, the velocity must be where it was
 /// predicted too, compared with the position's error.
 fn step(b: &mut Point, s: &Scales, t: f64, o: &mut Outcome) {
-    let before = b.determinants;
-    let h = t - b.t;
+    let mut before = b.determinants;
+    let mut h = t - b.t;
     b.t = t;
     for i in 0..N_COORDINATES {
         b.q[i] += h * (b.q_dot[i] + 0.5 * h * b.q_ddot[i]);
         b.q_dot[i] += h * b.q_ddot[i];
     }
-    let q = b.q;
-    let q_dot = b.q_dot;
+    let mut q = b.q;
+    let mut q_dot = b.q_dot;
     correct(b, s, MAX_CORRECTIONS, o);
     complete(b, s, o);
-    let mut error = 0.0;
-    let mut kink = 0.0;
+    let mut error: f64 = 0.0;
+    let mut kink: f64 = 0.0;
     let mut has_crossed = false;
     for i in 0..N_COORDINATES {
-        let apart = (b.q[i] - q[i]).abs() * s.inverse[i];
-        let turn = (h * (b.q_dot[i] - q_dot[i])).abs() * s.inverse[i];
+        let mut apart = (b.q[i] - q[i]).abs() * s.inverse[i];
+        let mut turn = (h * (b.q_dot[i] - q_dot[i])).abs() * s.inverse[i];
         error = if apart <= error { error } else { apart };
         kink = if turn > kink { turn } else { kink };
     }
     for i in 0..BLOCKS {
-        let stays = if before[i] > 0.0 { b.determinants[i] > 0.0 } else { b.determinants[i] < 0.0 };
+        let mut stays = if before[i] > 0.0 { b.determinants[i] > 0.0 } else { b.determinants[i] < 0.0 };
         has_crossed = has_crossed || !stays;
     }
-    let is_bent = o.sensitivity > NEARLY_SINGULAR && kink > KINK * error + SMOOTH;
-    let is_past = is_bent || (o.status == CONVERGED && has_crossed);
+    let mut is_bent = o.sensitivity > NEARLY_SINGULAR && kink > KINK * error + SMOOTH;
+    let mut is_past = is_bent || (o.status == CONVERGED && has_crossed);
     o.status = if error <= SMALL_ERROR { if is_past { SINGULAR } else { o.status } } else { NOT_CONVERGED };
 }
 
 /// Return the largest velocity of a point, in scales of the coordinates.
 fn speed_of(b: &Point, s: &Scales) -> f64 {
-    let mut most = 0.0;
+    let mut most: f64 = 0.0;
     for i in 0..N_COORDINATES {
         let speed = b.q_dot[i].abs() * s.inverse[i];
         most = if speed > most { speed } else { most };
@@ -722,7 +1549,7 @@ fn speed_of(b: &Point, s: &Scales) -> f64 {
 fn locks_up(b: &mut Point, s: &Scales, t: f64, smallest: f64, before: f64) -> bool {
     let forward = t - b.t;
     let speed = speed_of(b, s);
-    let mut growth = 0.0;
+    let mut growth: f64 = 0.0;
     for i in 0..N_COORDINATES {
         if b.q_dot[i].abs() * s.inverse[i] == speed {
             let sign = if b.q_dot[i] > 0.0 { 1.0 } else { -1.0 };
@@ -735,7 +1562,7 @@ fn locks_up(b: &mut Point, s: &Scales, t: f64, smallest: f64, before: f64) -> bo
     }
     b.t = t;
     position_at(b);
-    let mut total = 0.0;
+    let mut total: f64 = 0.0;
     for i in 0..N_EQUATIONS {
         total += b.Phi[i];
     }
@@ -922,7 +1749,7 @@ pub fn march_variants(m: &mut Variants) -> usize {
         record(m, &b, &o, 0, first, count);
         for time in 1..m.count {
             before.clone_from(&b);
-            let t = m.t[time];
+            let mut t = m.t[time];
             step(&mut b, &s, t, &mut o);
             if o.status != CONVERGED && !o.is_over {
                 take_up(&mut at, &before);

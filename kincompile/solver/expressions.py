@@ -23,7 +23,14 @@ from kincompile.solver.nodes import (
     Unary,
     Variable,
 )  # fmt: skip
-from kincompile.solver.vocabulary import CONSTANTS, LANES_OF_REALS, SIZES, TYPES, WORDS
+from kincompile.solver.vocabulary import (
+    CONSTANTS,
+    LANES_OF_REALS,
+    ROOM,
+    SIZES,
+    TYPES,
+    WORDS,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -198,8 +205,9 @@ class Expressions:
             if condition.type != TYPES["LaneBool"]:
                 raise refused(node, "where is said of a lane of truths")
             return self._choice(node, condition, *node.args[1:])
-        if name == "rows" and [type(x) for x in node.args] == [ast.Name]:
-            return Call(name, (), self.type_of(node, f"Rows[{ast.unparse(node.args[0])}]"))
+        if name in ("row", "rows") and [type(x) for x in node.args] == [ast.Name]:
+            kind = f"{name.title()}[{ast.unparse(node.args[0])}]"
+            return Call(name, (), self.type_of(node, kind))
         if name in self.structs and not node.args:
             return Call(name, (), Type(name))
         given = tuple(map(self.read, node.args))
@@ -216,6 +224,8 @@ class Expressions:
             return TYPES.get(text) or Type(text)
         if word in ("Row", "Rows") and size in SIZES:
             return Type("real", (size,) if word == "Row" else (size, LANE))
+        if word == "Matrix" and {*size.split(", ")} <= {*ROOM}:
+            return Type("real", tuple(size.split(", ")))
         if text == "Vector[Int]":
             return Type("int", ("any",))
         raise refused(node, f"{text} is no type of the language")
@@ -251,6 +261,8 @@ class Expressions:
                 return kind.dims == first.type.dims and bool(self._common(node, first, argument))
             case "rows":
                 return len(kind.dims) == 2 and kind.dims[1] == LANE
+            case "array":
+                return bool(kind.dims) and kind.dims[0] in SIZES
         return agrees(argument, self.type_of(node, wanted))
 
     def _own(

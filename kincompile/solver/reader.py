@@ -41,20 +41,30 @@ from kincompile.solver.nodes import (
 from kincompile.solver.vocabulary import CONSTANTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from kincompile.solver.nodes import Expression, Statement
 
 
 @cache
 def solver() -> Text:
-    """Return the solver, read once."""
+    """Return the march, read once."""
     return read((files("kincompile.solver") / "text.py").read_text(encoding="utf-8"))
 
 
-def read(source: str) -> Text:
-    """Return the structs and functions of a text; a `Refused` names the line that is none."""
-    text = Text({}, {})
+@cache
+def start() -> Text:
+    """Return the start, read once."""
+    source = (files("kincompile.solver") / "start.py").read_text(encoding="utf-8")
+    return read(source, {"Point": solver().structs["Point"]})
+
+
+def read(source: str, known: Mapping[str, Struct] | None = None) -> Text:
+    """Return the structs and functions of a text; a `Refused` names the line that is none.
+
+    It may use known structs of another text.
+    """
+    text = Text({**(known or {})}, {})
     comments = Comments(source)
     for item in ast.parse(source).body:
         match item:

@@ -25,36 +25,50 @@ TYPES = {
 SIZES = ("N", "M", "K", "LANES", "NONZEROS", "BLOCKS")
 """Coordinates, equations, parameters, points at once, entries of Phi_q, blocks of its solve."""
 
+ROOM = ("TALL", "WIDE")
+"""Rows and columns of a matrix of least squares: M + N, the equations and what bends a step, and
+N + 1, with a right side."""
+
 STATUSES = {
     "CONVERGED": 0, "NOT_CONVERGED": 1, "SINGULAR": 2, "NOT_FINITE": 3, "NOT_REACHED": 4,
     "LOCK_UP": 7,
 }  # fmt: skip
 """What becomes of a point, and the numbers that say so in all languages."""
 
-COUNTS = ("MAX_CORRECTIONS", "MAX_SUBSTEPS")
-
 CRITERIA = (
     "AGREEMENT", "BEFORE_LOCK_UP", "GROWN", "KINK", "LEFT", "NEARLY_SINGULAR",
     "RESIDUAL_FACTOR", "ROUNDING", "SMALL_ERROR", "SMALLEST_PART", "SMOOTH", "SOLVED",
     "TOO_NEAR",
 )  # fmt: skip
-"""The numbers of `criteria` that the text judges by, besides `COUNTS`."""
+COUNTS = ("MAX_CORRECTIONS", "MAX_SUBSTEPS")
+"""The numbers of `criteria` that the march judges by; and the whole ones."""
+
+START_CRITERIA = (
+    "AS_NEAR", "ASTRAY", "BEND", "FAR", "FOLDED", "LARGEST_ANGLE", "LONGEST_P", "MIRROR_STEP",
+    "MIRRORED", "NEAR_ANGLE", "NEAR_PART", "NUDGE", "SAME_POSITION", "SETTLED", "SHORTEST_STEP",
+    "STEEP", "SUFFICIENT", "THROWN", "WILD",
+)  # fmt: skip
+START_COUNTS = ("MOST_MIRRORED", "RESTARTS")
+"""Those that the start judges by besides."""
 
 TABLES = {
     "ANGULAR": Type("bool", ("N",)),
     "IS_REDUNDANT": Type("bool", ("M",)),
     "PROBE": Type("real", ("most",)),
     "PATTERN": Type("int", ("NONZEROS", "two")),
+    "MAY_TURN": Type("bool", ("N",)),
+    "COVER": Type("int", ("N",)),
 }
 """Which coordinates are angles, which equations repeat others, numbers without a pattern (as many
-as there are coordinates or equations), and the row and column of each entry of Phi_q."""
+as there are coordinates or equations), the row and column of each entry of Phi_q; which coordinates
+are angles or may be, and of each the first of its body's Euler parameters (N: it is none)."""
 
 CONSTANTS = (
-    dict.fromkeys((*SIZES, *STATUSES, *COUNTS), INT)
-    | dict.fromkeys((*CRITERIA, "NOTHING", "INFINITE"), REAL)
+    dict.fromkeys((*SIZES, *ROOM, *STATUSES, *COUNTS, *START_COUNTS), INT)
+    | dict.fromkeys((*CRITERIA, *START_CRITERIA, "NOTHING", "INFINITE", "TURN"), REAL)
     | TABLES
 )
-"""Names that have one value. `NOTHING` is the number that is none."""
+"""Names that have one value. `NOTHING` is the number that is none, `TURN` a whole one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +100,9 @@ WORDS = {
     # of numbers
     "abs": Word(("number",), "same"),
     "finite": Word(("number",), "truth"),
+    "floor": Word(("number",), "same"),
+    "single": Word(("number",), "same"),
+    "sqrt": Word(("number",), "same"),
     "max": Word(("number", "same"), "same"),
     "min": Word(("number", "same"), "same"),
     # of lanes: whether it holds for any, a part of a vector from a place on, a lane as a good point
@@ -96,7 +113,7 @@ WORDS = {
     "put_at": Word(("Point", "State", "Count", "Count"), changes=(0,)),
     "keep": Word(("Point", "Point"), changes=(0,)),
     # of arrays: a copy; the first lanes of rows into a block, at a time, from a variant on
-    "copied": Word(("rows",), "same"),
+    "copied": Word(("array",), "same"),
     "store": Word(("Block", "rows", "Count", "Count", "Count"), changes=(0,)),
 }
-"""Words that are called. ``where``, ``rows(N)`` and ``lanes`` are read beside them."""
+"""Words that are called. ``where``, ``row(N)``, ``rows(N)`` and ``lanes`` are read beside them."""

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kincompile.criteria import rounded
 from kincompile.solver import vocabulary
 
 if TYPE_CHECKING:
@@ -45,17 +46,30 @@ class Mechanism:
 
 
 def on_numpy(mechanism: Mechanism) -> ModuleType:
-    """Return the text as a module that solves a mechanism: `march`, `march_variants`, structs."""
-    spec = importlib.util.find_spec("kincompile.solver.text")
+    """Return the texts as a module that solves a mechanism: `march`, `start`, structs."""
+    n, m = (mechanism.sizes[name] for name in ("N", "M"))
+    sizes = {**mechanism.sizes, "TALL": m + n, "WIDE": n + 1}
+    kernels = _Kernels(mechanism)
+    own = {name: getattr(kernels, name) for name in (*vocabulary.KERNELS, "solve", "missed")}
+    module = _copy_of("kincompile.solver.start")
+    march = _copy_of("kincompile.solver.text")
+    vars(module).update(
+        {name: value for name, value in vars(march).items() if not name.startswith("_")}
+    )
+    for text in (march, module):
+        vars(text).update(**sizes, **mechanism.tables, **own)
+    for struct in vars(module).values():
+        if inspect.isclass(struct) and issubclass(struct, Struct):
+            struct.sizes = sizes
+    return module
+
+
+def _copy_of(name: str) -> ModuleType:
+    """Return a module of its own for a text."""
+    spec = importlib.util.find_spec(name)
     assert spec is not None and spec.loader is not None  # noqa: PT018
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    kernels = _Kernels(mechanism)
-    own = {name: getattr(kernels, name) for name in (*vocabulary.KERNELS, "solve", "missed")}
-    vars(module).update(**mechanism.sizes, **mechanism.tables, **own)
-    for struct in vars(module).values():
-        if inspect.isclass(struct) and issubclass(struct, Struct):
-            struct.sizes = mechanism.sizes
     return module
 
 
@@ -64,7 +78,7 @@ class Real:
 
 
 class Rows:
-    """Rows of numbers, whose last axis is the lane; likewise ``Row``, ``Vector``."""
+    """Rows of numbers, whose last axis is the lane; likewise ``Row``, ``Vector``, ``Matrix``."""
 
     def __class_getitem__(cls, size: object) -> type:
         """Return the type for a size."""
@@ -72,7 +86,7 @@ class Rows:
 
 
 Int = Count = Bool = Lane = LaneInt = LaneBool = Table = Block = Real
-Row = Vector = Rows
+Row = Vector = Matrix = Rows
 
 
 class Struct:
@@ -85,9 +99,9 @@ class Struct:
             word, _, size = text.rstrip("]").partition("[")
             kind = vocabulary.TYPES.get(word)
             lanes = self.sizes["LANES"]
-            if word in ("Row", "Rows"):
-                own = (self.sizes[size],) if word == "Row" else (self.sizes[size], lanes)
-                vars(self)[name] = np.zeros(own)
+            if word in ("Row", "Rows", "Matrix"):
+                own = tuple(self.sizes[x] for x in size.split(", "))
+                vars(self)[name] = np.zeros((*own, lanes) if word == "Rows" else own)
             elif kind is not None and kind.is_lane:
                 vars(self)[name] = np.zeros(lanes, BASES[kind.base])
             else:
@@ -153,8 +167,9 @@ class _Kernels:
         """Evaluate gamma."""
         self._fill(b.gamma, self.own["gamma"](b.q, b.q_dot, b.t, b.p))
 
-    def factor(self, b: Any) -> None:
+    def factor(self, b: Any, lanes: int | None = None) -> None:
         """Factor Phi_q."""
+        b = b if lanes is None else _first(b, lanes)
         b.F, found = self.own["factor"]([b.Phi_q[place] for place in self.mechanism.varying])
         self._fill(b.determinants, found)
 
@@ -215,11 +230,21 @@ def rows(size: int) -> list[Any]:
     return [None] * size
 
 
-copied, where, finite, lanes = np.copy, np.where, np.isfinite, range
-NOTHING, INFINITE = np.nan, np.inf
+def single(x: float) -> float:
+    """Return a number with 24 bits."""
+    return float(rounded(x))
+
+
+def row(size: int) -> Array:
+    """Return a row that is yet to be set."""
+    return np.zeros(size)
+
+
+copied, where, finite, lanes, floor, sqrt = np.copy, np.where, np.isfinite, range, np.floor, np.sqrt
+NOTHING, INFINITE, TURN = np.nan, np.inf, 2 * np.pi
 CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE, NOT_REACHED, LOCK_UP = vocabulary.STATUSES.values()
 
 # Until a mechanism gives its own:
-N = M = K = LANES = NONZEROS = BLOCKS = 0
-ANGULAR = IS_REDUNDANT = PROBE = PATTERN = ()
+N = M = K = LANES = NONZEROS = BLOCKS = TALL = WIDE = 0
+ANGULAR = IS_REDUNDANT = PROBE = PATTERN = MAY_TURN = COVER = ()
 position = factor = nu = gamma = constants = solve = missed = any_lane

@@ -22,12 +22,11 @@ from kincompile.errors import InputError, UnsupportedError
 from kincompile.ir.elimination import plan_solve, sizes_of
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from kincompile.emitters.evaluators import Listing
     from kincompile.emitters.planned_solve import BlockCall
     from kincompile.ir.inline import InlineProgram
-    from kincompile.ir.program import Program
     from kincompile.model.spline import SplineTable
 
 DIALECT = OCTAVE
@@ -165,19 +164,9 @@ def _numbers(places: Iterable[int]) -> str:
     return f"[{', '.join(str(k + 1) for k in places)}]"
 
 
-def _turning(program: Program) -> list[int]:
-    """Return the coordinates that may turn: angles, and free ones whose unit is not known."""
-    owned = {column for body in program.bodies for column in body.columns}
-    units = [item.unit for item in program.coordinates]
-    return [k for k, unit in enumerate(units) if unit == "rad" or not (unit or k in owned)]
-
-
-def _covers(program: Program) -> str:
+def _covers(covers: Sequence[Sequence[int]]) -> str:
     """Return the places of the Euler parameters of bodies in space, a column for each body."""
-    spatial = criteria.SPATIAL_COORDINATES
-    bodies = [x.columns for x in program.bodies if len(x.columns) == spatial]
-    rows = (" ".join(str(columns[k] + 1) for columns in bodies) for k in range(3, spatial))
-    return "; ".join(rows) if bodies else ""
+    return "; ".join(" ".join(str(k + 1) for k in row) for row in zip(*covers, strict=True))
 
 
 def _determinants(code: InlineProgram) -> list[str]:
@@ -247,18 +236,21 @@ def _criteria(names: Iterable[str]) -> dict[str, str]:
 def _assembly(code: InlineProgram) -> str:
     """Return the function that finds the position at the first time."""
     program = code.program
-    units = (item.unit for item in program.coordinates)
-    columns = (body.columns for body in program.bodies)
-    angles = [k for k, turns in enumerate(criteria.turning(units, columns)) if turns]
+    units = [item.unit for item in program.coordinates]
+    columns = [body.columns for body in program.bodies]
+    angles, free = (
+        [k for k, turns in enumerate(known(units, columns)) if turns]
+        for known in (criteria.turning, criteria.may_turn)
+    )
     determinants = "\n".join(_determinants(code))
     data = {
         "name": program.name,
         "fingerprint": program.fingerprint,
         "n": len(program.coordinates),
         "angles": _numbers(angles),
-        "may_turn": _numbers(_turning(program)),
+        "may_turn": _numbers(free),
         "m": len(program.equations),
-        "covers": _covers(program),
+        "covers": _covers(criteria.covers(columns)),
         "determinants": determinants,
         "functions": _called_in(determinants),
         **{name: repr(getattr(criteria, name)) for name in CRITERIA},

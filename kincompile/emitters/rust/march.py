@@ -6,8 +6,8 @@ import textwrap
 from typing import TYPE_CHECKING
 
 from kincompile.emitters.solver_printer import ATOM, CHOICE, OR, WIDTH, SolverPrinter
-from kincompile.solver.nodes import LANE, Call, Constant, Do, Field, For, Index, Name
-from kincompile.solver.vocabulary import KERNELS
+from kincompile.solver.nodes import LANE, REAL, Call, Constant, Do, Field, For, Index, Name
+from kincompile.solver.vocabulary import KERNELS, ROOM
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -39,7 +39,8 @@ class RustSolver(SolverPrinter):
     """Prints the solver as Rust."""
 
     calls: Mapping[str, str] = {  # a constant
-        "abs": "abs", "finite": "is_finite", "max": "max", "min": "min",
+        "abs": "abs", "finite": "is_finite", "floor": "floor", "max": "max", "min": "min",
+        "sqrt": "sqrt",
     }  # fmt: skip
 
     def __init__(self, text: Text) -> None:
@@ -47,8 +48,10 @@ class RustSolver(SolverPrinter):
         self.one: set[Variable] = set()  # what counts lanes, of which there is one
 
     def kind(self, kind: Type) -> str:
-        """Return a type."""
+        """Return a type; a large matrix is not on the stack."""
         text = BASES.get(kind.base, kind.base)
+        if kind.dims[:1] and kind.dims[0] in ROOM:
+            return f"Vec<[{text}; {kind.dims[1]}]>"
         for size in reversed([x for x in kind.dims if x != LANE]):
             text = f"[{text}; {SIZES.get(size, size)}]"
         return text
@@ -56,6 +59,8 @@ class RustSolver(SolverPrinter):
     def zero(self, kind: Type) -> str:
         """Return the first value of a field."""
         text = ZEROS[kind.base]
+        if kind.dims[:1] and kind.dims[0] in ROOM:
+            return f"vec![[{text}; {kind.dims[1]}]; {kind.dims[0]}]"
         for size in reversed([x for x in kind.dims if x != LANE]):
             text = f"[{text}; {SIZES.get(size, size)}]"
         return text
@@ -104,9 +109,12 @@ class RustSolver(SolverPrinter):
     def declared(self, node: Declare) -> Lines:
         """Return the lines of a declaration."""
         variable, value = node.variable, node.value
-        is_filled = isinstance(value, Call) and value.name == "rows"
-        mut = "mut " * (variable.is_mutable or is_filled or variable.type.base in self.structs)
-        return [f"let {mut}{variable.name} = {self.expression(value)};"]
+        is_filled = bool(variable.type.dims) or variable.type.base in self.structs
+        mut = "mut " * (variable.is_mutable or is_filled)
+        # A number that changes has no type yet where it is asked for its size.
+        is_open = variable.is_mutable and value.type == REAL and isinstance(value, Constant)
+        kind = ": f64" * is_open
+        return [f"let {mut}{variable.name}{kind} = {self.expression(value)};"]
 
     def assigned(self, node: Assign) -> Lines:
         """Return the lines of an assignment."""
@@ -114,7 +122,9 @@ class RustSolver(SolverPrinter):
         text = self.expression(value)
         if node.operation and value.type.base == "bool":
             text = f"{self.at(value, ATOM)} as usize"
-        if len(target.type.dims) == 2 and isinstance(value, Constant):
+        if target.type.dims not in ((), (LANE,)) and isinstance(value, Constant):
+            if target.type.dims[0] in ROOM:
+                return [f"{self.expression(target)}.fill([{text}; {target.type.dims[1]}]);"]
             text = f"[{text}; {self.size(target.type)}]"
         return [f"{self.expression(target)} {node.operation}= {text};"]
 
@@ -205,7 +215,7 @@ class RustSolver(SolverPrinter):
         match node.name, node.arguments:
             case "any_lane" | "copied", (value,):
                 return self.strong(value)
-            case "rows", ():
+            case "row" | "rows", ():
                 return f"[0.0; {self.size(node.type)}]", ATOM
             case "part", (vector, first):
                 return f"{self.expression(vector)}[{self.expression(first)}]", ATOM

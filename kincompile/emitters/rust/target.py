@@ -20,8 +20,15 @@ from kincompile.emitters.rust.functions import (
 )
 from kincompile.emitters.rust.march import RustSolver
 from kincompile.emitters.templates import fill
-from kincompile.solver.reader import solver
-from kincompile.solver.vocabulary import CONSTANTS, COUNTS, CRITERIA, STATUSES
+from kincompile.solver.reader import solver, start
+from kincompile.solver.vocabulary import (
+    CONSTANTS,
+    COUNTS,
+    CRITERIA,
+    START_COUNTS,
+    START_CRITERIA,
+    STATUSES,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
@@ -127,6 +134,10 @@ def _array(name: str, kind: str, size: int, rows: Iterable[str]) -> list[str]:
     return [f"pub const {name}: [{kind}; {size}] = [", *(f"    {x}" for x in rows), "];"]
 
 
+def _truths(values: Iterable[bool]) -> Iterable[str]:
+    return wrapped(str(x).lower() for x in values)
+
+
 def _tables(program: Program) -> list[str]:
     """Return the tables of splines."""
     lines = []
@@ -141,22 +152,28 @@ def _tables(program: Program) -> list[str]:
 
 @cache
 def _solver() -> str:
-    """Return the printed solver, which is the same for every mechanism."""
-    return RustSolver(solver()).text()
+    """Return the printed start and march, which are the same for every mechanism."""
+    return RustSolver(start()).text() + "\n" + RustSolver(solver()).text()
 
 
 def _march(program: Program) -> dict[str, Any]:
     """Return the solver, and what it judges by."""
-    units = (item.unit for item in program.coordinates)
-    angular = criteria.turning(units, (body.columns for body in program.bodies))
+    units = [item.unit for item in program.coordinates]
+    columns = [body.columns for body in program.bodies]
     n, m = len(program.coordinates), len(program.equations)
+    first = [n] * n
+    for cover in criteria.covers(columns):
+        for column in cover:
+            first[column] = cover[0]
     probe = criteria.probe_of(max(n, m)).tolist()
-    tables = _array("ANGULAR", "bool", n, wrapped(str(bool(x)).lower() for x in angular))
-    repeats = (str(x in program.redundant).lower() for x in program.equations)
-    tables += _array("IS_REDUNDANT", "bool", m, wrapped(repeats))
+    tables = _array("ANGULAR", "bool", n, _truths(criteria.turning(units, columns)))
+    repeats = (x in program.redundant for x in program.equations)
+    tables += _array("IS_REDUNDANT", "bool", m, _truths(repeats))
     tables += _array("PROBE", "f64", len(probe), wrapped(map(repr, probe)))
-    numbers = [f"const {x}: f64 = {getattr(criteria, x)!r};" for x in CRITERIA]
-    numbers += [f"const {x}: usize = {getattr(criteria, x)};" for x in COUNTS]
+    tables += _array("MAY_TURN", "bool", n, _truths(criteria.may_turn(units, columns)))
+    tables += _array("COVER", "usize", n, wrapped(map(str, first)))
+    numbers = [f"const {x}: f64 = {getattr(criteria, x)!r};" for x in (*CRITERIA, *START_CRITERIA)]
+    numbers += [f"const {x}: usize = {getattr(criteria, x)};" for x in (*COUNTS, *START_COUNTS)]
     numbers += [f"pub const {x}: usize = {number};" for x, number in STATUSES.items()]
     return {
         "tables": indented(tables, 0).replace("pub const", "const"),

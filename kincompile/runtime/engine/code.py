@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kincompile.criteria import SPATIAL_COORDINATES, turning
+from kincompile.criteria import SPATIAL_COORDINATES, covers, may_turn, turning
 from kincompile.errors import InputError, StructuralError, UnsupportedError
 from kincompile.names import listed
 
@@ -203,9 +203,8 @@ def attach(module: ModuleType) -> Code:
     lanes = names.get("LANES", {})
     coordinates = names["COORDINATES"]
     places = [range(first, first + count) for _, first, count in names.get("BODIES", ())]
-    is_angle = np.array([names["UNITS"][name] == "rad" for name in coordinates], dtype=bool)
     entries = _entries(names)
-    angular = np.array(turning((names["UNITS"][name] for name in coordinates), places), dtype=bool)
+    units = [names["UNITS"][name] for name in coordinates]
     code = Code(
         module=module,
         name=names["NAME"],
@@ -220,9 +219,9 @@ def attach(module: ModuleType) -> Code:
         constant=_constant(entries, len(names["EQUATIONS"]), len(coordinates)),
         varying=_varying(entries),
         without_guess=_without_guess(names),
-        angular=angular,
-        covers=_covers(names.get("BODIES", ())),
-        may_turn=is_angle | _without_body(names, coordinates),
+        angular=np.array(turning(units, places), dtype=bool),
+        covers=np.array(covers(places), dtype=int).reshape(-1, SPATIAL_COORDINATES - 3),
+        may_turn=np.array(may_turn(units, places), dtype=bool),
         position=names["position"],
         nu=names["nu"],
         gamma=names["gamma"],
@@ -310,20 +309,6 @@ def _without_guess(names: Mapping[str, Any]) -> tuple[str, ...]:
     given = np.concatenate(((0,), np.cumsum(names["GUESS"] != 0))).tolist()
     bodies = names.get("BODIES", ())
     return tuple(body for body, first, size in bodies if given[first] == given[first + size])
-
-
-def _covers(bodies: Sequence[tuple[str, int, int]]) -> NDArray[np.signedinteger[Any]]:
-    """Return the places of the Euler parameters of each body in space."""
-    first = [k + 3 for _, k, count in bodies if count == SPATIAL_COORDINATES]
-    return np.array(first, dtype=int)[:, np.newaxis] + np.arange(SPATIAL_COORDINATES - 3)
-
-
-def _without_body(names: Mapping[str, Any], coordinates: Sequence[str]) -> NDArray[np.bool_]:
-    """Return which coordinates belong to no body and have no unit."""
-    free = np.array([names["UNITS"][name] == "" for name in coordinates], dtype=bool)
-    for _, first, count in names.get("BODIES", ()):
-        free[first : first + count] = False
-    return free
 
 
 def require_square(code: Code) -> None:

@@ -7,6 +7,8 @@ import pytest
 
 import kincompile as kc
 
+from .conftest import nearly_dead_slider
+
 A, B, C, D = 10.0, 26.0, 18.0, 20.0
 ANGLES = {  # of coupler and rocker at a crank angle of 0, by the law of cosines
     sign: (
@@ -145,29 +147,14 @@ def test_that_a_guess_and_an_assembly_are_not_both_taken():
         kc.solve(four_bar(), TIMES, guess={"coupler.phi": 1}, assembly=1)
 
 
-PIN = 0.99
-"""How far beside the line of its slider the pin of a rod of length 1 is: nearly a dead centre."""
-
-
 @pytest.mark.parametrize("target", ["numpy", "c"])
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 def test_that_a_slider_is_found_on_its_nearer_side(target, unit, quick_compiler):
-    # These guesses lie beyond the dead centre by the angle of the rod, and Newton's steps go there.
-    m = kc.Mechanism("slider")
-    rod, block = (m.body(name, guess=(0, 0, 0)) for name in ("rod", "block"))
-    m.add(kc.Revolute("A", m.ground, (0, PIN * unit), rod, (0, 0)))
-    m.add(kc.Revolute("B", rod, (unit, 0), block, (0, 0)))
-    m.add(kc.Translational("line", m.ground, (0, 0), (1, 0), block, (0, 0), (1, 0)))
-    module = kc.compile(m, target=target)
+    model, sides, beyond = nearly_dead_slider(unit)
+    module = kc.compile(model, target=target)
     lengths = np.array([unit, unit, 1, unit, unit, 1])
-    reach = np.sqrt(1 - PIN**2)
-    sides = np.array([(0, PIN, np.arctan2(-PIN, x), x, 0, 0) for x in (reach, -reach)]) * lengths
-    for guess in (
-        [0.022, 0.953, -1.888, 0.064, 0.05, 0.413],
-        [0.03, 0.972, -1.794, 0.177, 0.004, -0.19],
-        [-0.078, 0.968, -1.851, 0.165, -0.036, 0.203],
-    ):
-        solution = kc.solve(module, 0.0, guess=guess * lengths)
+    for guess in beyond:
+        solution = kc.solve(module, 0.0, guess=guess)
         np.testing.assert_allclose(solution.q[0], sides[0], rtol=0, atol=1e-9 * unit)
         assert "on another branch than the guess" in solution.message
     # Half way between both, either will do, but it is said.

@@ -7,6 +7,7 @@ import pytest
 
 import kincompile as kc
 from kincompile import criteria
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.problem import problem
 from kincompile.solver.words import Mechanism, on_numpy
@@ -20,6 +21,8 @@ def mechanism_of(module, lanes):
         return lambda *states: own[kernel](module.ARRAYS, *states)
 
     units = [module.UNITS[name] for name in module.COORDINATES]
+    code, cover = code_of(module), np.full(module.N_COORDINATES, module.N_COORDINATES)
+    cover[code.covers] = code.covers[:, :1]
     columns = [range(first, first + count) for _, first, count in module.BODIES]
     n, m = module.N_COORDINATES, module.N_EQUATIONS
     kernels = {name: bound(name) for name in ("position", "nu", "gamma", "factor", "solve")}
@@ -35,6 +38,8 @@ def mechanism_of(module, lanes):
             "IS_REDUNDANT": [False] * m,
             "PROBE": criteria.probe_of(max(n, m)).tolist(),
             "PATTERN": module.PATTERN.tolist(),
+            "MAY_TURN": code.may_turn.tolist(),
+            "COVER": cover.tolist(),
         },
         kernels=kernels,
         varying=nonzeros.places,
@@ -47,6 +52,29 @@ def start_of(module, t):
     q = kc.solve(module, [t]).q[0]
     inputs = read_inputs(module, np.array([t]), None, None, criteria.TOLERANCE, 25)
     return q, problem(module, inputs.p, q, t).size
+
+
+def rough_guesses(module, count):
+    """Return guesses around the position at t = 0.
+
+    Of every other one angles are turned by whole turns, of every third one the signs of Euler
+    parameters are.
+    """
+    start = kc.solve(module, [0.0]).q[0]
+    equations = problem(module, module.DEFAULTS, start.copy(), 0.0)
+    rng = np.random.default_rng(7)
+    guesses = start + equations.reference * rng.uniform(-0.8, 0.8, (count, start.size))
+    turns = 2 * np.pi * rng.integers(-2, 3, guesses[::2].shape)
+    guesses[::2] += equations.code.may_turn * turns
+    for cover in equations.code.covers:
+        guesses[np.ix_(range(0, count, 3), cover)] *= -1
+    return guesses
+
+
+def size_around(module, guess):
+    """Return the size of a mechanism as the runtime finds it at a guess for t = 0."""
+    oriented = read_inputs(module, np.zeros(1), None, guess, criteria.TOLERANCE, 25).guess
+    return problem(module, module.DEFAULTS, oriented, 0.0).size
 
 
 def marched(module, lanes, t, sets, *, together=False):
