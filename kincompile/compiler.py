@@ -20,7 +20,7 @@ import logging
 import warnings
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,7 +41,7 @@ from kincompile.names import listed
 from kincompile.structure.counting import counting_problem
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from kincompile.ir.grouping import GroupedProgram
     from kincompile.ir.program import Program
     from kincompile.model.system import ConstraintSystem
-    from kincompile.runtime.engine.code import DynamicModules, Place
+    from kincompile.runtime.engine.code import Compiled, Dynamics, Kind, Place
     from kincompile.structure.report import Inspection
 
     LoadableSource = tuple[str, str, Mapping[str, NDArray[Any]], Mapping[str, str]]
@@ -223,41 +223,40 @@ def compile(  # noqa: A001 - the public name kc.compile
     UnsupportedError
         If there is no such target, it cannot print the mechanism, or there is no C compiler.
     """
-    from kincompile.runtime.engine.code import (
-        DRIVERS,
-        DYNAMICS,
-        FORCES,
-        JOINT_POINTS,
-        SENSITIVITIES,
-        UNDRIVEN,
-        ForceModules,
-        SensitiveModules,
-    )
-    from kincompile.runtime.load import from_source
-
     system = system_of(model)
     with _without_collector(system):
         target = _loadable(target, system, form)
         code = _lowered(system, form)
-        # The NumPy module has the constants, the checks and the careful march of the compiled one.
-        emitted = emit_program("numpy", code)
-        module = from_source(emitted.source, system.name, emitted.arrays)
-        if isinstance(code, InlineProgram) and target == "c":
-            module = _native(module, code)
-    vars(module)[JOINT_POINTS] = partial(_joint_points, system)
-    vars(module)[DRIVERS] = system.drivers_at
+        compiled = _loaded(code, target)
+    compiled.makers.update(_makers(compiled, system, code, target))
+    return remember_model(compiled.module, system)
+
+
+def _makers(
+    compiled: Compiled,
+    system: ConstraintSystem,
+    code: InlineProgram | GroupedProgram,
+    target: str,
+) -> dict[Kind[Any], Callable[..., Any]]:
+    """Return what compiles more of a mechanism when that is asked for."""
+    from kincompile.runtime.engine import code as kinds
+
+    makers: dict[Kind[Any], Callable[..., Any]] = {
+        kinds.POINTS: partial(_joint_points, system),
+        kinds.DRIVERS: lambda: system.drivers_at,
+    }
     if len(system.coordinates) <= LARGEST_REDUNDANT:
-        vars(module)[UNDRIVEN] = partial(_undriven, system)
-    if isinstance(code, InlineProgram):  # the program of a large mechanism is not worth its memory
-        vars(module)[SENSITIVITIES] = SensitiveModules(
-            cache(partial(_observing_module, code, target)),
-            cache(partial(_sensitive_module, code.program)),
-        )
-        if system.loads:
-            compiled = cache(partial(_forces_module, code, target))
-            vars(module)[FORCES] = ForceModules(compiled, _joints(system))
-            vars(module)[DYNAMICS] = cache(partial(_dynamic_modules, code, system, target))
-    return remember_model(module, system)
+        makers[kinds.UNDRIVEN] = partial(_undriven, system)
+    if not isinstance(code, InlineProgram):  # that of a large mechanism is not worth its memory
+        return makers
+    makers[kinds.SENSITIVITIES] = partial(_sensitivities, code, target)
+    makers[kinds.SENSITIVE] = partial(_with_sensitivities, code.program)
+    if system.loads:
+        makers[kinds.FORCES] = partial(_forces, code, target)
+        makers[kinds.JOINTS] = partial(_joints, system)
+        makers[kinds.DYNAMICS] = partial(_dynamics, code, system, target)
+        makers[kinds.SLOPES] = partial(_slopes, compiled, code, target)
+    return makers
 
 
 def _loadable(target: str, system: ConstraintSystem, form: str | None) -> str:
@@ -324,12 +323,9 @@ def _joints(system: ConstraintSystem) -> dict[str, tuple[str, ...]]:
     return {item.name: tuple(body.name for body in item.bodies) for item in system.constraints}
 
 
-def _joint_points(system: ConstraintSystem) -> ModuleType:
-    """Return a module whose outputs are the points of joints, for who asks for one of them."""
-    from kincompile.runtime.load import from_source
-
-    program = lower(system.observing(system.joint_points()))
-    return from_source(emit_program("numpy", inline(program)).source, system.name)
+def _joint_points(system: ConstraintSystem) -> Compiled:
+    """Return code whose outputs are the points of joints, for who asks for one of them."""
+    return _compiled(lower(system.observing(system.joint_points())), "numpy")
 
 
 def _undriven(system: ConstraintSystem) -> str:
@@ -365,51 +361,51 @@ def _moving(code: InlineProgram | GroupedProgram, system: ConstraintSystem) -> I
     return inline(with_motion(code, _dependent(code, system)[0]))
 
 
-def _sensitive_module(program: Program, names: tuple[str, ...]) -> ModuleType:
-    """Return the module of a mechanism with its sensitivities, for `kc.sensitivities`."""
-    from kincompile.runtime.load import from_source
-
-    return from_source(emit_program("numpy", _sensitive(program, names)).source, program.name)
+def _with_sensitivities(program: Program, names: tuple[str, ...]) -> Compiled:
+    """Return the code of a mechanism with its sensitivities, for `kc.sensitivities`."""
+    return _loaded(_sensitive(program, names), "numpy")
 
 
-def _observing_module(
+def _sensitivities(
     code: InlineProgram, target: str, names: tuple[str, ...], of: tuple[str, ...], second: bool
-) -> ModuleType | None:
-    """Return the module whose outputs are derivatives of columns, for `kc.sensitivities`."""
+) -> Compiled | None:
+    """Return code whose outputs are derivatives of columns, for `kc.sensitivities`."""
     from kincompile.ir.implicit import observing_sensitivities
 
     program = observing_sensitivities(code, names, of, second=second)
-    return None if program is None else _observing(program, target)
+    return None if program is None else _compiled(program, target)
 
 
-def _forces_module(code: InlineProgram, target: str, is_planned: bool) -> ModuleType | None:
-    """Return the module whose outputs are forces, for `kc.forces`."""
+def _forces(code: InlineProgram, target: str, is_planned: bool) -> Compiled | None:
+    """Return code whose outputs are forces, for `kc.forces`."""
     from kincompile.ir.forces import observing_forces
 
     program = observing_forces(code, is_planned=is_planned)
-    return None if program is None else _observing(program, target)
+    return None if program is None else _compiled(program, target)
 
 
-def _dynamic_modules(code: InlineProgram, system: ConstraintSystem, target: str) -> DynamicModules:
+def _dynamics(code: InlineProgram, system: ConstraintSystem, target: str) -> Dynamics:
     """Return the compiled equations of motion, for `kc.simulate`."""
     from kincompile.ir.accelerations import observing_accelerations, observing_corrections
-    from kincompile.runtime.engine.code import DynamicModules
+    from kincompile.runtime.engine.code import Dynamics
 
     left_out, redundant, free = _dependent(code, system)
-    accelerations = _observing(observing_accelerations(code, left_out), target)
-    corrections = _observing(observing_corrections(code, left_out), target)
-    slopes = cache(partial(_slopes_module, code, left_out, target))
-    return DynamicModules(accelerations, corrections, slopes, redundant, free)
+    accelerations = _compiled(observing_accelerations(code, left_out), target)
+    corrections = _compiled(observing_corrections(code, left_out), target)
+    return Dynamics(accelerations, corrections, redundant, free)
 
 
-def _slopes_module(
-    code: InlineProgram, left_out: Collection[int], target: str
-) -> tuple[ModuleType, Sequence[Place], Mapping[Place, float]]:
-    """Return the module of the derivatives of accelerations, for implicit integrators."""
+def _slopes(
+    compiled: Compiled, code: InlineProgram, target: str
+) -> tuple[Compiled, Sequence[Place], Mapping[Place, float]]:
+    """Return the code of the derivatives of accelerations, for implicit integrators."""
     from kincompile.ir.accelerations import observing_slopes
+    from kincompile.runtime.engine.code import DYNAMICS
 
+    redundant = compiled.request(DYNAMICS).redundant
+    left_out = {compiled.equations.index(name) for name in redundant}
     program, places, numbers = observing_slopes(code, left_out)
-    return _observing(program, target), places, numbers
+    return _compiled(program, target), places, numbers
 
 
 def _dependent(
@@ -437,20 +433,23 @@ def forces_program(system: ConstraintSystem) -> Program | None:
     return observing_forces(code) if isinstance(code, InlineProgram) else None
 
 
-def _observing(program: Program, target: str) -> ModuleType:
-    """Return the module of a program without equations."""
+def _compiled(program: Program, target: str) -> Compiled:
+    """Return the code of a program, as its module gives it."""
+    return _loaded(inline(program), target)
+
+
+def _loaded(code: InlineProgram | GroupedProgram, target: str) -> Compiled:
+    from kincompile.runtime.engine.code import code_of
     from kincompile.runtime.load import from_source
 
-    written = inline(program)
-    module = from_source(emit_program("numpy", written).source, program.name)
-    return _native(module, written) if target == "c" else module
+    # The NumPy module has the constants, the checks and the careful march of the compiled one.
+    emitted = emit_program("numpy", code)
+    module = from_source(emitted.source, code.program.name, emitted.arrays)
+    if target == "c":
+        from kincompile.runtime.native.module import make_native
 
-
-def _native(module: ModuleType, code: InlineProgram) -> ModuleType:
-    """Replace the functions of a loaded NumPy module by compiled C."""
-    from kincompile.runtime.native.module import make_native
-
-    return make_native(module, emit_program("c", code).files)
+        module = make_native(module, emit_program("c", code).files)
+    return code_of(module)
 
 
 def inspect(model: Mechanism | ConstraintSystem) -> Inspection:

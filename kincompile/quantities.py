@@ -174,6 +174,11 @@ def nonzeros_of(quantity: Quantity) -> str:
     return "nonzeros" if quantity.name == "Phi_q" else f"{quantity.name}_nonzeros"
 
 
+def pattern_of(quantity: Quantity) -> str:
+    """Return the constant of the rows and columns of a matrix's entries."""
+    return "PATTERN" if quantity.name == "Phi_q" else f"PATTERN_{quantity.name}"
+
+
 def states_of(names: Iterable[str]) -> tuple[str, ...]:
     """Return what quantities read of q, q_dot and q_ddot together."""
     return max((quantity_named(name).states for name in names), key=len)

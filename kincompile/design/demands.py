@@ -20,6 +20,7 @@ from kincompile.design.columns import Column, column_of
 from kincompile.design.targets import Limit, Moves, Passing, TimeRatio
 from kincompile.errors import InputError
 from kincompile.names import rate
+from kincompile.runtime.engine.code import code_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -103,12 +104,13 @@ def read_demands(
 ) -> Demands:
     """Return the targets with their columns; refuse what cannot be asked for, all at once."""
     problems: list[str] = []
+    code = code_of(module)
 
     def column(name: str, title: str = "", further: int = 0) -> Column:
         """Return a column, of which rates of some further order are needed too."""
         try:
-            found = column_of(module, name)
-            column_of(module, rate(found.of, min(found.order + further, 2)))
+            found = column_of(code, name)
+            column_of(code, rate(found.of, min(found.order + further, 2)))
         except InputError as error:
             problems.extend(f"{title}: {item}" if title else item for item in error.problems)
             return Column(name, "", name, 0)

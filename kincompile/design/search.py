@@ -23,7 +23,7 @@ from kincompile.errors import KincompileWarning
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, all_hold
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import measured
 from kincompile.runtime.results.observed import observed
 from kincompile.runtime.solve import solve
 
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from kincompile.design.columns import Column
     from kincompile.design.demands import Demands
     from kincompile.design.targets import Passing
+    from kincompile.runtime.engine.code import Compiled
 
     Array = NDArray[np.float64]
 
@@ -143,7 +144,7 @@ class Search:
         scores = np.full(len(values), np.inf)
         if not alive.size:
             return scores
-        seen = _Columns(self.module, motion, self._times, sets[alive])
+        seen = _Columns(code_of(self.module), motion, self._times, sets[alive])
         error, variables = self._errors(seen, alive.size)
         scores[alive] = error
         for k in np.argsort(error)[:MOST_AT_ONCE].tolist():
@@ -171,7 +172,7 @@ class Search:
         if code.redundant:
             return self._through_with_care(sets, guess)
         with np.errstate(all="ignore"):
-            equations = problem(self.module, sets[0], guess, times[0])
+            equations = measured(code, sets[0], guess, times[0])
             march = March(equations, Planned(code, np.ascontiguousarray(sets.T)), TOLERANCE)
             q = np.repeat(guess[:, np.newaxis], len(sets), axis=1)
             found = march.correct_together(q, times[0], MAX_ITERATIONS)
@@ -276,13 +277,11 @@ APART = 0.01
 class _Columns:
     """The columns of motions, (B, N), by name and order, evaluated once."""
 
-    def __init__(
-        self, module: ModuleType, motion: tuple[Array, ...], t: Array, sets: Array
-    ) -> None:
-        self._coordinates: tuple[str, ...] = module.COORDINATES
+    def __init__(self, code: Compiled, motion: tuple[Array, ...], t: Array, sets: Array) -> None:
+        self._coordinates = code.coordinates
         self._motion = motion
         q, q_dot, q_ddot = motion
-        self._outputs = observed(module, (q, q_dot, q_ddot), t, sets)
+        self._outputs = observed(code, (q, q_dot, q_ddot), t, sets)
 
     def __getitem__(self, key: tuple[str, int]) -> Array:
         """Return a coordinate or an output, or a rate of it."""

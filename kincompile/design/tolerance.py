@@ -27,6 +27,7 @@ from kincompile.design.variation import clearance_names, require_mechanism, with
 from kincompile.errors import InputError
 from kincompile.files.file_format import MOST_SAMPLES
 from kincompile.names import listed, suggestion
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.inputs import mapping_of, require_seed
 from kincompile.runtime.results.sensitivities import sensitivities
 from kincompile.runtime.solve import solve
@@ -114,7 +115,7 @@ def tolerance(
     if not isinstance(wanted, int | np.integer) or not 0 <= wanted <= MOST_SAMPLES:
         raise InputError(f"samples is {samples!r}: give a whole number up to {MOST_SAMPLES:,}.")
     module = compile_model(with_clearances(model, loose))
-    columns = columns_of(module, of)
+    columns = columns_of(code_of(module), of)
     times = np.linspace(0.0, model.end, model.points) if t is None else t
     nominal = solve(module, times, dict(p or {}), guess, assembly=assembly, throw=True)
     names = [name for group, _ in sources.values() for name in group]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.code import Array, Code
+    from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.problem import Problem
 
@@ -37,7 +37,7 @@ MOST_PARTS = 1000
 """Parts of a line after which its end is given up."""
 
 
-def along(code: Code, p: Array, t: float) -> Code:
+def along(code: Compiled, p: Array, t: float) -> Compiled:
     """Return the equations at one time on lines from parameters p: the way along is their time."""
 
     def parameters(part: Any, to: Array) -> Array:

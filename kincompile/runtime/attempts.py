@@ -28,7 +28,7 @@ from kincompile.runtime.start import begins, mirrored
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.code import Array, Code
+    from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.problem import Problem
 
     Mask = NDArray[np.bool_]
@@ -98,7 +98,7 @@ class _Pattern:
     order: list[tuple[int, Places, tuple[Places, ...]]]
 
 
-def _pattern_of(code: Code) -> _Pattern:
+def _pattern_of(code: Compiled) -> _Pattern:
     """Return the pattern of a module: eliminated first is what is coupled with fewest others."""
     rows, columns, numbers = (np.array(x) for x in zip(*code.entries, strict=True))
     own = _Pattern(rows, columns, numbers.astype(np.float64), [], [])

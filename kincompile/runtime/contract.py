@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from kincompile.errors import ContractError, InputError
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Container, Iterator, Mapping
     from types import ModuleType
 
     from kincompile.quantities import Part, Quantity
@@ -46,14 +46,14 @@ MARKS: Mapping[Part, str] = {
 """What modules have that have quantities of such parts."""
 
 
-def present_in(module: ModuleType) -> tuple[Quantity, ...]:
-    """Return the quantities of a module: of outputs, of loads and of motion where it has any."""
-    return quantities.quantities_of([part for part, mark in MARKS.items() if hasattr(module, mark)])
+def present_in(names: Container[str]) -> tuple[Quantity, ...]:
+    """Return the quantities of a module with these names: of outputs, loads, motion if it can."""
+    return quantities.quantities_of([part for part, mark in MARKS.items() if mark in names])
 
 
-def functions(module: ModuleType) -> tuple[str, ...]:
-    """Return the functions of an emitted module."""
-    present = present_in(module)
+def functions(names: Container[str]) -> tuple[str, ...]:
+    """Return the functions of an emitted module with these names."""
+    present = present_in(names)
     matrices = (item.name for item in present if item.is_matrix)
     return (*quantities.functions(present), *(f"{name}_nonzeros" for name in matrices))
 
@@ -63,59 +63,57 @@ def check(module: ModuleType) -> None:
 
     A `ContractError` has all that is wrong, and what to do.
     """
-    if getattr(module, "FORMAT", None) == 1 and not hasattr(module, "BODIES"):
-        module.__dict__["BODIES"] = _bodies(getattr(module, "COORDINATES", ()))
+    names = vars(module)
+    if names.get("FORMAT") == 1 and "BODIES" not in names:
+        names["BODIES"] = _bodies(names.get("COORDINATES", ()))
     # Each stage relies on what the stage before has found to be right.
     for stage in (_format, _missing, _names, _sizes, _numbers):
         problems = [
             f"{module.__name__} is not a module that kincompile emitted: {problem}."
-            for problem in stage(module)
+            for problem in stage(names)
         ]
         if problems:
             problems[-1] += f" {REMEDY}"
             raise ContractError(problems)
-    module.__dict__["InputError"] = InputError
+    names["InputError"] = InputError
 
 
-def _format(module: ModuleType) -> Iterator[str]:
+def _format(names: Mapping[str, Any]) -> Iterator[str]:
     """Report a format that this version does not read; its names may well be others."""
-    if not hasattr(module, "FORMAT"):
+    if "FORMAT" not in names:
         yield "FORMAT is missing; a model is read by kc.read_model and compiled by kc.compile"
-    elif (given := module.FORMAT) not in FORMATS:
+    elif (given := names["FORMAT"]) not in FORMATS:
         yield f"its FORMAT is {given!r} and this version reads {listed(FORMATS)}"
-    elif getattr(module, "FORM", None) == "grouped" and not hasattr(module, "BLOCKS"):
+    elif names.get("FORM") == "grouped" and "BLOCKS" not in names:
         yield "it has no BLOCKS, which a module in grouped form is solved by"
 
 
 def _bodies(coordinates: object) -> tuple[tuple[str, int, int], ...]:
     """Return the bodies of a module of format 1, which has them in the names of coordinates."""
     names = coordinates if isinstance(coordinates, tuple) else ()
-    found = []
-    for k, name in enumerate(names):
-        body = str(name).removeprefix("x_")
-        if names[k : k + 3] == (f"x_{body}", f"y_{body}", f"phi_{body}"):
-            found.append((body, k, 3))
-    return tuple(found)
+    bodies = ((k, str(name).removeprefix("x_")) for k, name in enumerate(names))
+    columns = ((k, x, (f"x_{x}", f"y_{x}", f"phi_{x}")) for k, x in bodies)
+    return tuple((x, k, 3) for k, x, own in columns if names[k : k + 3] == own)
 
 
-def _missing(module: ModuleType) -> Iterator[str]:
+def _missing(names: Mapping[str, Any]) -> Iterator[str]:
     """Report names that are absent or of the wrong kind."""
     for name, kind in _CONSTANTS.items():
-        if not hasattr(module, name):
+        if name not in names:
             yield f"{name} is missing"
-        elif not isinstance(getattr(module, name), kind):
-            given = type(getattr(module, name)).__name__
+        elif not isinstance(names[name], kind):
+            given = type(names[name]).__name__
             yield f"{name} is of type {given}, not {kind.__name__}"
-    for name in functions(module):
-        if not callable(getattr(module, name, None)):
+    for name in functions(names):
+        if not callable(names.get(name)):
             yield f"the function {name} is missing"
 
 
-def _names(module: ModuleType) -> Iterator[str]:
+def _names(given: Mapping[str, Any]) -> Iterator[str]:
     """Report tuples of names of the wrong length, with a name twice, or with something else."""
-    counts = {"COORDINATES": module.N_COORDINATES, "EQUATIONS": module.N_EQUATIONS}
+    counts = {"COORDINATES": given["N_COORDINATES"], "EQUATIONS": given["N_EQUATIONS"]}
     for constant in ("COORDINATES", "EQUATIONS", "PARAMETERS"):
-        names = getattr(module, constant)
+        names = given[constant]
         if not all(isinstance(name, str) for name in names):
             yield f"{constant} holds something else than names"
         elif len(set(names)) != len(names):
@@ -124,30 +122,30 @@ def _names(module: ModuleType) -> Iterator[str]:
             yield f"{constant} has {len(names)} names, and N_{constant} is {counts[constant]}"
 
 
-def _sizes(module: ModuleType) -> Iterator[str]:
+def _sizes(names: Mapping[str, Any]) -> Iterator[str]:
     """Report shapes that contradict the names."""
-    n, k = module.N_COORDINATES, len(module.PARAMETERS)
-    if module.DEFAULTS.shape != (k,):
-        yield f"DEFAULTS has shape {module.DEFAULTS.shape}, and there are {k} PARAMETERS"
-    if module.GUESS.shape != (n,):
-        yield f"GUESS has shape {module.GUESS.shape}, and there are {n} COORDINATES"
-    without = [name for name in module.COORDINATES + module.PARAMETERS if name not in module.UNITS]
-    if without:
+    n, k = names["N_COORDINATES"], len(names["PARAMETERS"])
+    if (shape := names["DEFAULTS"].shape) != (k,):
+        yield f"DEFAULTS has shape {shape}, and there are {k} PARAMETERS"
+    if (shape := names["GUESS"].shape) != (n,):
+        yield f"GUESS has shape {shape}, and there are {n} COORDINATES"
+    named = *names["COORDINATES"], *names["PARAMETERS"]
+    if without := [name for name in named if name not in names["UNITS"]]:
         yield f"UNITS does not say the unit of {listed(without)}"
-    if module.PATTERN.ndim != 2 or module.PATTERN.shape[1] != 2:
-        yield f"PATTERN has shape {module.PATTERN.shape}, not (nonzeros, 2)"
+    if (shape := names["PATTERN"].shape)[1:] != (2,):
+        yield f"PATTERN has shape {shape}, not (nonzeros, 2)"
 
 
-def _numbers(module: ModuleType) -> Iterator[str]:
+def _numbers(names: Mapping[str, Any]) -> Iterator[str]:
     """Report values that are not finite or out of range."""
     for name in ("DEFAULTS", "GUESS"):
-        values = getattr(module, name)
+        values = names[name]
         if values.dtype != np.float64 or not np.isfinite(values).all():
             yield f"{name} does not hold finite floating-point numbers only"
-    pattern, n = module.PATTERN, module.N_COORDINATES
+    pattern, m, n = names["PATTERN"], names["N_EQUATIONS"], names["N_COORDINATES"]
     if not np.issubdtype(pattern.dtype, np.integer):
         yield f"PATTERN holds {pattern.dtype}, not integers"
-    elif np.any(pattern < 0) or np.any(pattern >= (module.N_EQUATIONS, n)):
-        yield f"PATTERN points outside the {module.N_EQUATIONS} x {n} matrix Phi_q"
+    elif np.any(pattern < 0) or np.any(pattern >= (m, n)):
+        yield f"PATTERN points outside the {m} x {n} matrix Phi_q"
     elif np.any(np.diff(pattern[:, 0] * n + pattern[:, 1]) <= 0):
         yield "PATTERN does not go row by row"

@@ -20,10 +20,10 @@ from kincompile.runtime.status import Status
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from kincompile.runtime.engine.code import Array
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.results.solution import Solution
 
-    Array = NDArray[np.float64]
     Mask = NDArray[np.bool_]
 
 NAMED_TIMES = 6

@@ -7,6 +7,7 @@ import operator
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -14,11 +15,10 @@ import numpy as np
 from kincompile.criteria import LONGEST_P
 from kincompile.errors import InputError
 from kincompile.names import LARGEST_SEED, column_name, listed, shown, suggestion
-from kincompile.runtime.engine.code import Code, code_of, require_square
+from kincompile.runtime.engine.code import Compiled, code_of, require_square
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import ModuleType
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -56,7 +56,7 @@ SMALLEST_GRID = 32
 class Inputs:
     """What the solver works with, checked."""
 
-    code: Code  # a module with as many equations as coordinates, or more that agree
+    code: Compiled  # a module with as many equations as coordinates, or more that agree
     t: NDArray[np.float64]  # (N,): the time grid, finite and monotone
     p: NDArray[np.float64]  # (k,): a value for each parameter; of several sets the first
     guess: NDArray[np.float64]  # (n,): where Newton starts
@@ -104,24 +104,24 @@ class Variants:
         return np.meshgrid(*arrays, indexing="ij") if self.is_product else arrays
 
 
-def _read_variants(module: ModuleType, p: Values, product: bool) -> Variants:
+def _read_variants(names: tuple[str, ...], p: Values, product: bool) -> Variants:
     """Read parameters that may be those of several sets: see `solve`."""
     if isinstance(p, Mapping):
         return read_sweep(p, product)
     if not isinstance(p, np.ndarray) or p.ndim != 3:
         return Variants(p)
     count, one, size = p.shape
-    if one != 1 or size != len(module.PARAMETERS) or count == 0 or p.dtype.kind not in "iuf":
+    if one != 1 or size != len(names) or count == 0 or p.dtype.kind not in "iuf":
         raise InputError(
             f"p has shape {p.shape} and type {p.dtype}: give real numbers of shape "
-            f"(B, 1, {len(module.PARAMETERS)}) for B variants of {listed(module.PARAMETERS)}."
+            f"(B, 1, {len(names)}) for B variants of {listed(names)}."
         )
     sets = np.ascontiguousarray(p[:, 0], dtype=np.float64)
     bad = np.argwhere(~np.isfinite(sets))
     if bad.size:
         variant, which = bad[0].tolist()
         raise InputError(
-            f"parameter {module.PARAMETERS[which]!r} of variant {variant} is "
+            f"parameter {names[which]!r} of variant {variant} is "
             f"{sets[variant, which]}: give a finite number."
         )
     return Variants(sets[0], sets)
@@ -172,12 +172,13 @@ def read_inputs(
     equation determines with `may_move`. All that is wrong with the values is told at once, by name.
     """
     _require_module(module)
-    given = Variants(p) if product is None else _read_variants(module, p, product)
+    code = code_of(module)
+    given = Variants(p) if product is None else _read_variants(code.parameters, p, product)
     problems = list(given.problems)
     values = (
         _times(t, problems),
-        _values("parameter", module.PARAMETERS, module.DEFAULTS, given.common, problems),
-        _values("coordinate", module.COORDINATES, module.GUESS, guess, problems),
+        _values("parameter", code.parameters, code.defaults, given.common, problems),
+        _values("coordinate", code.coordinates, code.guess, guess, problems),
         _tolerance(tolerance, problems),
         _count(max_iterations, problems),
     )
@@ -186,8 +187,7 @@ def read_inputs(
     if through not in (None, "smooth"):
         problems.append(f"through is {through!r}: give 'smooth', or nothing.")
     sweep = dict(given.sweep)
-    sets = None if problems else given.parameters(module.PARAMETERS, values[1])
-    code = code_of(module)
+    sets = None if problems else given.parameters(code.parameters, values[1])
     if not may_move:
         require_square(code)
     if code.covers.size:
@@ -209,7 +209,7 @@ def read_inputs(
 
 def _require_module(module: object) -> None:
     """Refuse what was not compiled or not loaded, with the step that is missing."""
-    if hasattr(module, "N_COORDINATES") and callable(getattr(module, "position", None)):
+    if isinstance(module, ModuleType) and vars(module).keys() >= {"N_COORDINATES", "position"}:
         return
     if isinstance(module, str | os.PathLike):
         remedy = "load the file first: module = kc.load(path)"
@@ -303,7 +303,7 @@ def real_numbers(what: str, given: object, problems: list[str]) -> NDArray[np.fl
     return array.astype(np.float64)
 
 
-def _without_orientation(code: Code, guess: NDArray[np.float64]) -> list[str]:
+def _without_orientation(code: Compiled, guess: NDArray[np.float64]) -> list[str]:
     """Return what is wrong with Euler parameters of length zero."""
     bodies = {first + 3: name for name, first, _ in code.bodies}
     return [
@@ -314,7 +314,7 @@ def _without_orientation(code: Code, guess: NDArray[np.float64]) -> list[str]:
     ]
 
 
-def _oriented(code: Code, guess: NDArray[np.float64]) -> NDArray[np.float64]:
+def _oriented(code: Compiled, guess: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a guess with Euler parameters of a length near one: any length is an orientation.
 
     By their largest first, since the squares of large ones overflow.

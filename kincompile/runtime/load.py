@@ -54,9 +54,7 @@ def load(path: str | os.PathLike[str]) -> ModuleType:
         When it is not an emitted module, or one that this version cannot use.
     """
     file = Path(path)
-    module = ModuleType(file.stem)
-    text, name = _text(file), str(file.absolute())
-    return _fill(module, name, text)
+    return _fill(ModuleType(file.stem), str(file.absolute()), _text(file))
 
 
 def from_source(
@@ -75,7 +73,7 @@ def from_source(
     linecache.cache[filename] = (len(source), None, source.splitlines(keepends=True), filename)
     module = ModuleType(name)
     if arrays:
-        module.__dict__["ARRAYS_OF_COMPANION"] = dict(arrays)
+        vars(module)["ARRAYS_OF_COMPANION"] = dict(arrays)
     return _fill(module, filename, source)
 
 
@@ -95,9 +93,9 @@ def _text(file: Path) -> str:
 
 def _fill(module: ModuleType, filename: str, source: str) -> ModuleType:
     """Run a module's text in it and check the result."""
-    module.__file__ = filename
+    module.__file__, names = filename, vars(module)
     try:
-        exec(compile(source, filename, "exec"), module.__dict__)
+        exec(compile(source, filename, "exec"), names)
     except SyntaxError as error:
         raise ContractError(
             f"{filename} is not a Python module: {error.msg} in line {error.lineno}. {REMEDY}"
@@ -107,7 +105,6 @@ def _fill(module: ModuleType, filename: str, source: str) -> ModuleType:
             f"{filename} cannot be loaded: {type(error).__name__}: {error}. {REMEDY}"
         ) from error
     check(module)
-    module.__dict__["_empty"] = empty
-    attach(module)
-    module.__dict__["_repr_html_"] = partial(module_html, module)
+    names["_empty"] = empty
+    names["_repr_html_"] = partial(module_html, attach(module))
     return module

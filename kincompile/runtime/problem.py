@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import ROUNDING, STEEP, probe_of, rounded, size_of
-from kincompile.runtime.engine.code import Array, code_of
+from kincompile.runtime.engine.code import Array, Compiled, code_of
 from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.engine.scales import Scales
 from kincompile.runtime.engine.sparse import Sparse
@@ -34,8 +34,13 @@ class Problem(Scales):
         return point if math.isfinite(point.Phi.sum()) else None
 
 
-def problem(
-    module: ModuleType,
+def problem(module: ModuleType, p: Array, q: Array, t: float) -> Problem:
+    """Return the equations of a module that somebody holds; see `measured`."""
+    return measured(code_of(module), p, q, t)
+
+
+def measured(
+    code: Compiled,
     p: Array,
     q: Array,
     t: float,
@@ -43,12 +48,11 @@ def problem(
     sparse: bool = False,
     engine: Linear | None = None,
 ) -> Problem:
-    """Set a module's parameters; the equations at a guess or a position give the scales.
+    """Set the parameters; the equations at a guess or a position give the scales.
 
-    With `sparse`, a module that has blocks is solved by them, without a dense matrix. An engine
-    with these parameters may be given.
+    With `sparse`, code that has blocks is solved by them, without a dense matrix. An engine with
+    these parameters may be given.
     """
-    code = code_of(module)
     m, angular, pattern = len(code.equations), code.angular, code.pattern
     if engine is None:
         engine = Sparse(code, p) if sparse and code.blocks else Dense(code, p)

@@ -12,7 +12,7 @@ import numpy as np
 from kincompile.criteria import LATE, MAX_SUBSTEPS, ZERO
 from kincompile.errors import BranchSwitchWarning, SingularConfigurationWarning
 from kincompile.names import listed
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import measured
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.singular.assemblies import unchosen
 from kincompile.runtime.singular.reach import impossible, missed
@@ -23,7 +23,7 @@ from kincompile.tables import pose
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from kincompile.runtime.engine.code import Array, Code
+    from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.follow import Motion
     from kincompile.runtime.inputs import Inputs
@@ -93,7 +93,7 @@ def start_of_first(inputs: Inputs, solution: Solution) -> str:
     if solution.status[0, 0] != Status.CONVERGED:
         return ""
     q, time = solution.q[0, 0].copy(), float(inputs.t[0])
-    equations = problem(inputs.code.module, inputs.p, inputs.guess, time)
+    equations = measured(inputs.code, inputs.p, inputs.guess, time)
     guess, found = (equations.at(position, time) for position in (inputs.guess, q))
     return unchosen(inputs, q, bool(guess and found and is_folded(equations, guess, found)))
 
@@ -193,7 +193,7 @@ def _asked(inputs: Inputs, outcome: Outcome) -> str:
 
 
 def _equations_at(inputs: Inputs, point: Point) -> Problem:
-    return problem(inputs.code.module, inputs.p, point.q, point.t)
+    return measured(inputs.code, inputs.p, point.q, point.t)
 
 
 def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str:
@@ -236,7 +236,7 @@ def _unmet(inputs: Inputs, point: Point) -> str:
     )
 
 
-def _places(code: Code, q: Array) -> Iterator[str]:
+def _places(code: Compiled, q: Array) -> Iterator[str]:
     """Yield where each body is, and the values of coordinates that belong to none."""
     values = dict(zip(code.coordinates, q.tolist(), strict=True))
     places = {body: slice(first, first + count) for body, first, count in code.bodies}

@@ -9,6 +9,7 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.names import listed, suggestion
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.runtime.results.force_measures import force_measure
@@ -80,8 +81,8 @@ class Layout:
         whole = np.flatnonzero(solution.good.all(axis=1)).tolist() if measured else []
         motions = [solution.variant(number) for number in whole]
         sets = np.array(list(solution.parameters.values())).T[whole]
-        module = solution.require_module("its measures")
-        measures = measures_together(motions, module, sets, names)
+        code = code_of(solution.require_module("its measures"))
+        measures = measures_together(motions, code, sets, names)
         for number, several in zip(whole, measures, strict=True):
             for own in several:
                 for item in measured:

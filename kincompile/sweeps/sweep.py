@@ -163,7 +163,7 @@ def _layout(
         return read_layout(begin, columns, measures), sources
     except InputError:
         code = code_of(sources.module())
-        if code.lanes is None or not hasattr(code.module, "LOADS"):
+        if code.lanes is None or not code.has_loads:
             raise
     planned, given, joints = emit_forces(model, target)
     first = None if planned is None else Sources(*planned)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from kincompile.errors import KincompileWarning
-from kincompile.runtime.engine.code import FORCES, ForceModules
+from kincompile.runtime.engine.code import FORCES, JOINTS, code_of
 from kincompile.runtime.load import from_source
 from kincompile.runtime.native.module import make_native
 from kincompile.runtime.solve import solve_sets
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.sweeps.layout import Layout
 
 
@@ -81,17 +81,17 @@ def _module(sources: Sources) -> ModuleType:
     module = from_source(sources.numpy, sources.name, sources.arrays)
     module = make_native(module, sources.native) if sources.native else module
     if sources.forces is not None:
-        vars(module)[FORCES] = ForceModules(partial(_forces, sources), sources.forces[2])
+        makers, joints = code_of(module).makers, sources.forces[2]
+        makers |= {FORCES: partial(_forces, sources), JOINTS: lambda: joints}
     return module
 
 
-def _forces(sources: Sources, is_planned: bool) -> ModuleType | None:
-    """Return the module of forces, as `ForceModules` describes."""
+def _forces(sources: Sources, is_planned: bool) -> Compiled | None:
+    """Return the compiled forces, as `FORCES` describes."""
     assert sources.forces is not None
     planned, given, _ = sources.forces
-    if is_planned:
-        return None if planned is None else planned.module()
-    return given.module()
+    chosen = planned if is_planned else given
+    return None if chosen is None else code_of(chosen.module())
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,11 +18,11 @@ from kincompile.verification.oracles import DIFFERENCE, STEP, slope
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from types import ModuleType
 
     from numpy.typing import NDArray
 
     from kincompile.model.system import ConstraintSystem
+    from kincompile.runtime.engine.code import Compiled
     from kincompile.verification.samples import Samples
 
     Array = NDArray[Any]
@@ -45,14 +45,14 @@ def errors_of_motion(samples: Samples, model: ConstraintSystem | None) -> Iterat
     """Yield quantity, row, coordinate, oracle, error and limit of all that loads bring along."""
     with np.errstate(all="ignore"):
         yield from _errors_of_loads(samples, model)
-        if hasattr(samples.module, "accelerations"):
+        if "accelerations" in samples.code.functions:
             yield from _errors_of_accelerations(samples)
 
 
 def _errors_of_loads(samples: Samples, model: ConstraintSystem | None) -> Iterator[Found]:
     """Yield the errors of M, Q and the Jacobians of Q."""
-    module, scale = samples.module, samples.reference
-    names, both = module.COORDINATES, np.multiply.outer(scale, scale)
+    code, scale = samples.code, samples.reference
+    names, both = code.coordinates, np.multiply.outer(scale, scale)
     M, Q = (_forms(samples, name) for name in ("M", "Q"))
     transposed, least = M[0].swapaxes(1, 2), np.linalg.eigvalsh(M[0] * both)[:, :1]
     largest = np.abs(M[0] * both).max(axis=(1, 2))[:, np.newaxis]
@@ -83,11 +83,11 @@ def _errors_of_loads(samples: Samples, model: ConstraintSystem | None) -> Iterat
 
 def _errors_of_accelerations(samples: Samples) -> Iterator[Found]:
     """Yield by how much accelerations and multipliers miss their equations."""
-    module, scale = samples.module, samples.reference
+    code, scale = samples.code, samples.reference
     parts: list[list[Array]] = [[] for _ in range(4)]
     for q, q_dot, t, p in samples.each():
-        given = module.M(q, t, p), module.Phi_q(q, t, p), module.Q(q, q_dot, t, p)
-        for part, value in zip(parts, (*given, module.gamma(q, q_dot, t, p)), strict=True):
+        given = code.M(q, t, p), code.Phi_q(q, t, p), code.Q(q, q_dot, t, p)
+        for part, value in zip(parts, (*given, code.gamma(q, q_dot, t, p)), strict=True):
             part.append(np.asarray(value))
     M, Phi_q, Q, gamma = map(np.array, parts)
     regular = np.array([_is_regular(J * scale) for J in Phi_q], dtype=bool)
@@ -107,20 +107,20 @@ def _errors_of_accelerations(samples: Samples) -> Iterator[Found]:
         rows.append(np.where(kept, missing, 0.0))
     oracle = "put back"
     for name, names, found in (
-        ("accelerations", module.COORDINATES, balance), ("multipliers", module.EQUATIONS, rows),
+        ("accelerations", code.coordinates, balance), ("multipliers", code.equations, rows),
     ):  # fmt: skip
         yield from _rows(name, names, oracle, np.max(found, axis=0)[..., np.newaxis], EXACT)
 
 
 def _forms(samples: Samples, name: str) -> list[Array]:
     """Return a quantity as each function of the module gives it, (S, rows) or (S, n, n)."""
-    module, given = samples.module, states_of((name,))
+    code, given = samples.code, states_of((name,))
     moving = ("q", "q_dot")[: len(given)]
     states = [(*state[: len(moving)], *state[2:]) for state in samples.each()]
     batch = (*(getattr(samples, x) for x in moving), samples.t, samples.p)
 
     def of_single(function: str, place: int | None = None) -> list[Array]:
-        call = getattr(module, function)
+        call = code.functions[function]
         both = [call(*state) for state in states], call(*batch)
         if place is None:
             return [np.array(both[0]), np.asarray(both[1])]
@@ -128,15 +128,15 @@ def _forms(samples: Samples, name: str) -> list[Array]:
 
     found = of_single(name)
     if name in MATRICES:
-        found += [_dense(module, name, entries) for entries in of_single(f"{name}_nonzeros")]
+        found += [_dense(code, name, entries) for entries in of_single(f"{name}_nonzeros")]
     elif name in TOGETHER["forward_dynamics"]:
         found += of_single("forward_dynamics", TOGETHER["forward_dynamics"].index(name))
     return found
 
 
-def _dense(module: ModuleType, name: str, entries: Array) -> Array:
+def _dense(code: Compiled, name: str, entries: Array) -> Array:
     """Return matrices (S, n, n) of their entries."""
-    n, pattern = len(module.COORDINATES), getattr(module, f"PATTERN_{name}")
+    n, pattern = len(code.coordinates), code.patterns[name]
     matrix = np.zeros((len(entries), n, n))
     matrix[:, pattern[:, 0], pattern[:, 1]] = entries
     return matrix
@@ -148,7 +148,7 @@ def _complex_slopes(samples: Samples, order: int) -> Array:
     for q, q_dot, t, p in samples.each():
         try:
             rows = [
-                samples.module.Q(q + h * (order == 0), q_dot + h * (order == 1), t, p) for h in one
+                samples.code.Q(q + h * (order == 0), q_dot + h * (order == 1), t, p) for h in one
             ]
             found.append(np.imag(rows).T / STEP)
         except (ArithmeticError, TypeError, ValueError):
@@ -158,13 +158,13 @@ def _complex_slopes(samples: Samples, order: int) -> Array:
 
 def _differences(samples: Samples, order: int) -> Array:
     """Return the same by differences."""
-    module, scale, columns = samples.module, samples.reference, []
+    code, scale, columns = samples.code, samples.reference, []
     for step, size in zip(np.eye(scale.size) * scale, scale, strict=True):
 
         def aside(h: float, step: Array = step) -> Array:
             moved = [h * step * (k == order) for k in range(2)]
             states = samples.q + moved[0], samples.q_dot + moved[1]
-            return np.asarray(module.Q(*states, samples.t, samples.p))
+            return np.asarray(code.Q(*states, samples.t, samples.p))
 
         columns.append(slope(aside, DIFFERENCE) / size)
     return np.stack(columns, axis=-1)

@@ -34,7 +34,7 @@ def errors_of_outputs(
     the Jacobian with differences by each coordinate, the outputs themselves with the model where it
     is known. Where an output has no value, nothing is said of its derivatives.
     """
-    module, reference = samples.module, samples.reference
+    code, reference = samples.code, samples.reference
     second = np.roll(samples.q_dot, 1, axis=0)
 
     states = samples.q, samples.q_dot, second, samples.t, samples.p
@@ -43,12 +43,12 @@ def errors_of_outputs(
         """Return a quantity a time s later."""
         q = samples.q + s * samples.q_dot + s * s / 2 * second
         rates = samples.q_dot + s * second
-        return np.asarray(getattr(module, quantity)(q, rates, second, samples.t + s, samples.p))
+        return np.asarray(code.functions[quantity](q, rates, second, samples.t + s, samples.p))
 
     def aside(s: float, column: int) -> Array:
         """Return the outputs beside the states in one coordinate."""
         q = samples.q + s * reference[column] * np.eye(reference.size)[column]
-        return np.asarray(module.outputs(q, *states[1:]))
+        return np.asarray(code.functions["outputs"](q, *states[1:]))
 
     compared = {"outputs_dot": "outputs", "outputs_ddot": "outputs_dot"}
     errors_of = {
@@ -56,18 +56,19 @@ def errors_of_outputs(
         for name, of in compared.items()
     }
     if model is not None:
-        errors_of["outputs"] = _relative(module.outputs(*states), _of_model(model, *states), 0.0)
+        values = code.functions["outputs"](*states)
+        errors_of["outputs"] = _relative(values, _of_model(model, *states), 0.0)
     for quantity, found in errors_of.items():
-        for name, error in zip(module.OUTPUTS, found, strict=True):
+        for name, error in zip(code.outputs, found, strict=True):
             yield quantity, name, "", error
     by = [_differences(partial(aside, column=k)) for k in range(reference.size)]
-    jacobian = module.outputs_q(*states)
+    jacobian = code.outputs_q(*states)
     errors = np.array([
         _relative(jacobian[..., k] * reference[k], *rough) for k, rough in enumerate(by)
     ])  # fmt: skip
-    for name, own in zip(module.OUTPUTS, errors.T, strict=True):
+    for name, own in zip(code.outputs, errors.T, strict=True):
         worst = int(np.argmax(own))
-        yield "outputs_q", name, module.COORDINATES[worst], float(own[worst])
+        yield "outputs_q", name, code.coordinates[worst], float(own[worst])
 
 
 def _of_model(

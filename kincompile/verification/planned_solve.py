@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from kincompile.criteria import SINGULAR_SENSITIVITY
 from kincompile.runtime.engine.blocks import BlockSolver
-from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.engine.planned import Planned, stacked
 from kincompile.verification.samples import dense
 
@@ -44,9 +43,9 @@ class PlannedSolve:
 
     def __init__(self, samples: Samples) -> None:
         self._at = samples.only(_regular(samples))
-        self._module, self._code = samples.module, code_of(samples.module)
-        self._nonzeros = self._module.Phi_q_nonzeros(self._at.q, self._at.t, self._at.p)
-        self._Phi_q = dense(self._module, self._nonzeros)
+        self._code = samples.code
+        self._nonzeros = self._code.nonzeros(self._at.q, self._at.t, self._at.p)
+        self._Phi_q = dense(self._code, self._nonzeros)
         random, shape = np.random.default_rng(SEED), (2, *self._at.q.shape)
         self._b, self._other = random.uniform(-1, 1, shape)
 
@@ -65,8 +64,9 @@ class PlannedSolve:
     def _solutions(self) -> Iterator[Array]:
         """Yield x (S, n) of each function that solves, of single states and of batches."""
         code, systems = self._code, list(zip(self._nonzeros, self._b, strict=True))
-        yield np.array([self._module.solve(*system) for system in systems])
-        yield self._module.solve(self._nonzeros, self._b)
+        solve = code.functions["solve"]
+        yield np.array([solve(*system) for system in systems])
+        yield solve(self._nonzeros, self._b)
         if code.lanes is not None:
             yield np.array(
                 [self._by_floats(*state) for state in zip(self._at.each(), self._b, strict=True)]
@@ -93,7 +93,7 @@ class PlannedSolve:
         engine = Planned(self._code, self._at.p.T)
         try:
             q = self._at.q * (1 + ASIDE * 1j * self._other)
-            nonzeros = self._module.Phi_q_nonzeros(q, self._at.t, self._at.p)
+            nonzeros = self._code.nonzeros(q, self._at.t, self._at.p)
             point = engine.evaluate(q.T, self._at.t)
         except TypeError:
             nonzeros = _between(self._nonzeros)
@@ -101,7 +101,7 @@ class PlannedSolve:
             point.Phi_q = _between(stacked(point.Phi_q, self.states).T).T
         b = self._b + 1j * self._other
         x = engine.solve(point, b.T)
-        return dense(self._module, nonzeros), np.array(np.broadcast_arrays(*x)).T, b
+        return dense(self._code, nonzeros), np.array(np.broadcast_arrays(*x)).T, b
 
     @property
     def has_blocks(self) -> bool:
@@ -128,7 +128,7 @@ def _regular(samples: Samples) -> NDArray[np.bool_]:
     given = zip(samples.each(), samples.terms, strict=True)
     return np.array(
         [
-            _sensitivity(samples.module.Phi_q(q, t, p) * samples.reference / terms[:, np.newaxis])
+            _sensitivity(samples.code.Phi_q(q, t, p) * samples.reference / terms[:, np.newaxis])
             < SINGULAR_SENSITIVITY
             for (q, _, t, p), terms in given
         ]

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from kincompile.errors import InputError
 from kincompile.quantities import OF_EQUATIONS, TOGETHER, functions, states_of
 from kincompile.runtime.corrector import nearest
+from kincompile.runtime.engine.code import read
 from kincompile.runtime.newton import newton
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import measured
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from kincompile.quantities import Quantity
+    from kincompile.runtime.engine.code import Compiled
 
 Array = NDArray[Any]
 
@@ -40,7 +42,7 @@ away a coordinate has no digits left for a difference."""
 class Samples:
     """States of a module."""
 
-    module: ModuleType
+    code: Compiled
     # q, q_dot (S, n): positions and rates
     q: Array
     q_dot: Array
@@ -62,7 +64,7 @@ class Samples:
     @cached_property
     def terms(self) -> Array:
         """What the terms of each equation contribute to it, shape (S, m)."""
-        Phi_q = np.array([self.module.Phi_q(q, t, p) for q, _, t, p in self.each()])
+        Phi_q = np.array([self.code.Phi_q(q, t, p) for q, _, t, p in self.each()])
         found = np.abs(Phi_q) @ self.reference
         return np.where(found > 0, found, 1.0)
 
@@ -79,8 +81,8 @@ class Samples:
 
         They are written out one by one, and a batch runs on other numbers than a single state.
         """
-        module, q, t, p = self.module, self.q, self.t, self.p
-        shape = len(q), len(module.EQUATIONS), -1
+        code, q, t, p = self.code, self.q, self.t, self.p
+        shape = len(q), len(code.equations), -1
         for name, given in functions(OF_EQUATIONS).items():
             if quantity.name in given:
                 yield np.array([self._value(quantity, name, *state) for state in self.each()])
@@ -88,80 +90,81 @@ class Samples:
         if quantity.name not in TOGETHER["kinematics"]:
             return
         place = TOGETHER["kinematics"].index(quantity.name)
-        found = module.kinematics_batch_last(q.T, self.q_dot.T, t, p.T)[place].T
+        found = code.functions["kinematics_batch_last"](q.T, self.q_dot.T, t, p.T)[place].T
         if not quantity.is_matrix:
             yield found.reshape(shape)
             return
-        singles = np.array([module.Phi_q_nonzeros(q, t, p) for q, _, t, p in self.each()])
-        for entries in (found, singles, module.Phi_q_nonzeros(q, t, p)):
-            yield dense(module, entries)
+        singles = np.array([code.nonzeros(q, t, p) for q, _, t, p in self.each()])
+        for entries in (found, singles, code.nonzeros(q, t, p)):
+            yield dense(code, entries)
 
     def _value(
         self, quantity: Quantity, name: str, q: Array, q_dot: Array, t: Any, p: Array
     ) -> Array:
         """Return a quantity as a function of the module gives it; a vector as a column."""
-        given, function = functions(OF_EQUATIONS)[name], getattr(self.module, name)
+        given, function = functions(OF_EQUATIONS)[name], self.code.functions[name]
         found = function(*(q, q_dot)[: len(states_of(given))], t, p)
         value = np.asarray(found if len(given) == 1 else found[given.index(quantity.name)])
         return value if quantity.is_matrix else value[..., np.newaxis]
 
 
-def dense(module: ModuleType, nonzeros: Array) -> Array:
+def dense(code: Compiled, nonzeros: Array) -> Array:
     """Return matrices (..., m, n) of the entries (..., nnz) of their pattern."""
-    shape = *nonzeros.shape[:-1], len(module.EQUATIONS), len(module.COORDINATES)
+    shape = *nonzeros.shape[:-1], len(code.equations), len(code.coordinates)
     matrix = np.zeros(shape, nonzeros.dtype)
-    matrix[..., module.PATTERN[:, 0], module.PATTERN[:, 1]] = nonzeros
+    matrix[..., code.pattern[:, 0], code.pattern[:, 1]] = nonzeros
     return matrix
 
 
 def samples_of(module: ModuleType) -> Samples:
     """Return the states of a module, seeded; refuse equations without a value near the guess."""
     random = np.random.default_rng(SEED)
-    guess, defaults = module.GUESS, module.DEFAULTS
-    reference = problem(module, defaults, guess, 0.0).reference
-    spread = _spread(module, reference)
+    code = read(module)  # as it is now: a function may have been replaced since it was loaded
+    guess, defaults = code.guess, code.defaults
+    reference = measured(code, defaults, guess, 0.0).reference
+    spread = _spread(code, reference)
     generic, assembled = [], []
     for _ in range(STATES):
         t = float(random.uniform(0.1, 0.9))
         away, rates = random.uniform(-AWAY, AWAY, (2, guess.size)) * reference
         other = defaults + random.uniform(-1, 1, defaults.size) * spread
         for p in (other, defaults):  # other parameters may be outside of a domain
-            if _is_finite(module, guess + away, t, p):
+            if _is_finite(code, guess + away, t, p):
                 generic.append((guess + away, 3 * rates, t, p))
                 break
-        q = _assembled(module, guess + away, t)
+        q = _assembled(code, guess + away, t)
         if q is not None and np.max(np.abs(q - guess) / reference, initial=0.0) <= FAR:
             assembled.append((q, 3 * rates, t, defaults))
     if not generic + assembled:
         raise InputError(
-            f"the equations of {module.NAME} have no finite value near the guess: give a guess "
+            f"the equations of {code.name} have no finite value near the guess: give a guess "
             "near the assembled mechanism."
         )
     positions, rates, times, parameters = zip(*generic, *assembled, strict=True)
     arrays = np.array(positions), np.array(rates), np.array(times), np.array(parameters)
-    return Samples(module, *arrays, reference, len(assembled))
+    return Samples(code, *arrays, reference, len(assembled))
 
 
-def _assembled(module: ModuleType, near: Array, t: float) -> Array | None:
+def _assembled(code: Compiled, near: Array, t: float) -> Array | None:
     """Return an assembled position; of what moves freely one near a state, else near the guess."""
-    if not getattr(module, "UNSOLVABLE", "") and len(module.EQUATIONS) >= near.size:
-        found = newton(module, t, module.GUESS)
+    if not code.unsolvable and len(code.equations) >= near.size:
+        found = newton(code.module, t, code.guess)
         return found.q if found.status is Status.CONVERGED else None
-    attempt = nearest(problem(module, module.DEFAULTS, near, t), t, near)
+    attempt = nearest(measured(code, code.defaults, near, t), t, near)
     return attempt.last.q if attempt.status is Status.CONVERGED else None
 
 
-def _spread(module: ModuleType, reference: Array) -> Array:
+def _spread(code: Compiled, reference: Array) -> Array:
     """Return by how much each parameter may differ from its default, shape (k,)."""
-    units = module.UNITS
-    size = dict(zip((units[name] for name in module.COORDINATES), reference, strict=True))
-    small = [AWAY * size.get(units[name], 1.0) for name in module.PARAMETERS]
-    return np.where(module.DEFAULTS == 0, small, APART * np.abs(module.DEFAULTS))
+    units = code.units
+    size = dict(zip((units[name] for name in code.coordinates), reference, strict=True))
+    small = [AWAY * size.get(units[name], 1.0) for name in code.parameters]
+    return np.where(code.defaults == 0, small, APART * np.abs(code.defaults))
 
 
-def _is_finite(module: ModuleType, q: Array, t: float, p: Array) -> bool:
+def _is_finite(code: Compiled, q: Array, t: float, p: Array) -> bool:
     try:
-        values = module.position(q, t, p)
+        values = code.position(q, t, p)
     except (ArithmeticError, ValueError):
         return False
     return all(bool(np.isfinite(value).all()) for value in values)

@@ -215,8 +215,8 @@ def verify(model: Mechanism | ConstraintSystem | ModuleType) -> Verification:
         module = model
     else:
         module = _compiled(model)
-    if not hasattr(module, "LOADS"):
-        require_square(code_of(module))
+    if not (code := code_of(module)).has_loads:
+        require_square(code)
     with np.errstate(all="ignore"):
         samples = samples_of(module)
         checks = (
@@ -238,20 +238,20 @@ def _compiled(model: Mechanism | ConstraintSystem) -> ModuleType:
 
 def _checks(samples: Samples) -> Iterator[Check]:
     """Yield the checks of each equation by the oracles."""
-    module, known = samples.module, _Phi_of_model(samples.module)
+    code, known = samples.code, _Phi_of_model(samples.code.module)
     for quantity in OF_EQUATIONS:
-        Phi = known if quantity.name == "Phi" and known else module.Phi
+        Phi = known if quantity.name == "Phi" and known else code.functions["Phi"]
         error, limit, judge = _judged(samples, quantity, Phi)
         # The entry and the state with the largest error, compared with the allowed one.
         columns = np.argmax(error, axis=2)
         errors = np.max(error, axis=2)
         worst = np.argmax(errors / limit, axis=0)
-        for row, equation in enumerate(module.EQUATIONS):
+        for row, equation in enumerate(code.equations):
             at = worst[row], row
             yield Check(
                 quantity.name,
                 equation,
-                module.COORDINATES[columns[at]] if quantity.is_matrix else "",
+                code.coordinates[columns[at]] if quantity.is_matrix else "",
                 THE_MODEL if Phi is known else ORACLES[quantity.name][judge[at]].name,
                 float(errors[at]),
                 bool(errors[at] <= limit[at]),
@@ -272,11 +272,11 @@ def _Phi_of_model(module: ModuleType) -> PhiOfParameters | None:
 
 def _checks_of_solve(samples: Samples) -> Iterator[Check]:
     """Yield the checks of the planned solve, if there is one, where Phi_q is regular."""
-    plan = PlannedSolve(samples) if hasattr(samples.module, "solve") else None
+    plan = PlannedSolve(samples) if "solve" in samples.code.functions else None
     if plan is None or not plan.states:
         return
     oracle = "multiplied back"
-    for equation, error in zip(samples.module.EQUATIONS, plan.errors().tolist(), strict=True):
+    for equation, error in zip(samples.code.equations, plan.errors().tolist(), strict=True):
         yield Check(SOLVE, equation, "", oracle, error, error <= LIMIT)
     if plan.has_blocks:
         error = plan.error_of_determinants()
@@ -285,17 +285,18 @@ def _checks_of_solve(samples: Samples) -> Iterator[Check]:
 
 def _checks_of_outputs(samples: Samples) -> Iterator[Check]:
     """Yield the checks of the derivatives of outputs, if there are any."""
-    if not hasattr(samples.module, "OUTPUTS"):
+    if not samples.code.outputs:
         return
-    for quantity, output, coordinate, error in errors_of_outputs(samples, model_of(samples.module)):
+    found = errors_of_outputs(samples, model_of(samples.code.module))
+    for quantity, output, coordinate, error in found:
         oracle = THE_MODEL if quantity == "outputs" else "differences"
         yield Check(quantity, output, coordinate, oracle, error, error <= LARGEST_ERROR)
 
 
 def _checks_of_motion(samples: Samples) -> Iterator[Check]:
     """Yield the checks of masses, forces and equations of motion, if there are any."""
-    if hasattr(samples.module, "LOADS"):
-        found = errors_of_motion(samples, model_of(samples.module))
+    if samples.code.has_loads:
+        found = errors_of_motion(samples, model_of(samples.code.module))
         for quantity, row, coordinate, oracle, error, limit in found:
             yield Check(quantity, row, coordinate, oracle, error, error <= limit)
 

@@ -9,6 +9,7 @@ import sympy
 
 import kincompile as kc
 from kincompile import spatial
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.observed import observed
 
@@ -58,7 +59,7 @@ def compare(found, event, solution):
     assert found["status"] == solution.status.tolist()
     module, p = solution.module, np.array(list(solution.parameters.values()))
     motion = solution.q, solution.q_dot, solution.q_ddot
-    outputs = observed(module, motion, solution.t, p)
+    outputs = observed(code_of(module), motion, solution.t, p)
     if np.isfinite(solution.q[0]).all():
         equations = problem(module, p, solution.q[0].copy(), solution.t[0])
         scales = np.array([equations.size]), equations.magnitude, equations.noise

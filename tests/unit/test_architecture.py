@@ -235,6 +235,19 @@ def test_imports_go_down_and_do_not_cross_the_wall() -> None:
     assert floor_violations(package_sources()) == []
 
 
+def test_a_module_is_read_by_name_at_the_border_alone() -> None:
+    """Elsewhere its `Compiled` says what it has."""
+    by_name = re.compile(r"\b(?:getattr|hasattr|vars)\([^()]*\bmodule\b|module\.__dict__")
+    border = {"contract", "inputs", "load", "engine.code", "native.module"}
+    found = {
+        name
+        for name, source in package_sources().items()
+        if by_name.search(source)
+        and part(name) in {RUNTIME, "compiler", "design", "sweeps", "verification", "view"}
+    }
+    assert found == {f"{PACKAGE}.{RUNTIME}.{name}" for name in border}
+
+
 def test_there_is_no_import_cycle() -> None:
     assert import_cycle(package_sources()) == []
 

@@ -18,7 +18,7 @@ from kincompile.emitters.numpy.text import (
 )
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.templates import fill
-from kincompile.quantities import FORMAT, kernels, quantity_named, states_of
+from kincompile.quantities import FORMAT, kernels, pattern_of, quantity_named, states_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -151,16 +151,12 @@ def bodies_text(program: Program) -> str:
     )
 
 
-def _pattern_name(quantity: Quantity) -> str:
-    return "PATTERN" if quantity.name == "Phi_q" else f"PATTERN_{quantity.name}"
-
-
 def _patterns(code: InlineProgram) -> Iterator[str]:
     """Yield the places of the entries of each matrix, and its entries that never change."""
     for quantity in code.program.quantities:
         if not quantity.is_matrix:
             continue
-        entries, name = code.entries(quantity.name), _pattern_name(quantity)
+        entries, name = code.entries(quantity.name), pattern_of(quantity)
         places = wrapped([f"({entry.row}, {entry.column})" for entry in entries])
         values = {k: code.number(entry.node) for k, entry in enumerate(entries)}
         constants = [f"{k}: {float(x)!r}" for k, x in values.items() if x is not None]
@@ -185,7 +181,7 @@ def _results(program: Program) -> Iterator[str]:
         if not quantity.is_matrix:
             results.setdefault(f"({rows},), range({rows})", []).append(name)
             continue
-        columns, pattern = sizes[quantity.columns], _pattern_name(quantity)
+        columns, pattern = sizes[quantity.columns], pattern_of(quantity)
         constants = f"_CONSTANTS{pattern.removeprefix('PATTERN')}"
         places = f"{pattern} @ ({columns}, 1)"
         results[f"({rows}, {columns}), {places}, {constants}"] = [name]
@@ -227,7 +223,7 @@ def public_functions(
         texts = {quantity.name: f"{quantity.about.rstrip('.')}, shape (..., {shape})."}
         if quantity.is_matrix:
             size = nonzeros if quantity.name == "Phi_q" else "nonzeros"
-            order = f"Entries of {quantity.name} in the order of {_pattern_name(quantity)}"
+            order = f"Entries of {quantity.name} in the order of {pattern_of(quantity)}"
             texts[f"{quantity.name}_nonzeros"] = f"{order}, shape (..., {size})."
         states = ", ".join(quantity.states)
         for name, text in texts.items():

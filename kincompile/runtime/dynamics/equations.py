@@ -9,16 +9,15 @@ import numpy as np
 from kincompile.criteria import RANK, RESIDUAL_FACTOR, SMALL_CORRECTION, SOLVED, TOLERANCE
 from kincompile.errors import InputError
 from kincompile.names import without_loads
-from kincompile.runtime.engine.code import DYNAMICS, on_request
+from kincompile.runtime.engine.code import DYNAMICS, SLOPES
 from kincompile.runtime.engine.dense import powers_of_rows
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import measured
 from kincompile.runtime.statics.balance import STEP
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import ModuleType
 
-    from kincompile.runtime.engine.code import Array, DynamicModules
+    from kincompile.runtime.engine.code import Array, Compiled, Dynamics
     from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.inputs import Inputs
 
@@ -28,13 +27,11 @@ CORRECTIONS = 8
 """Corrections of a state that drifted, until its constraints hold: each squares what is missing."""
 
 
-def dynamic_modules(module: ModuleType) -> DynamicModules:
+def dynamics_of(code: Compiled) -> Dynamics:
     """Return the compiled equations of motion of a mechanism; say so where there can be none."""
-    if not hasattr(module, "LOADS"):
-        raise InputError(without_loads(module.NAME))
-    wanted = "whose equations of motion are not compiled:", "and simulate that"
-    found: Callable[[], DynamicModules] = on_request(module, DYNAMICS, *wanted)
-    return found()
+    if not code.has_loads:
+        raise InputError(without_loads(code.name))
+    return code.request(DYNAMICS)
 
 
 class Equations:
@@ -44,26 +41,25 @@ class Equations:
     `independent` are the rows of equations that repeat no other.
     """
 
-    def __init__(self, inputs: Inputs, modules: DynamicModules) -> None:
+    def __init__(self, inputs: Inputs, dynamics: Dynamics) -> None:
         self.code, self.parameters = inputs.code, inputs.p
         self.n = inputs.guess.size
-        self.names_free = modules.free
-        self._accelerate = _evaluator(modules.accelerations, self.n, inputs.p)
-        self._correct = _evaluator(modules.corrections, self.n, inputs.p)
-        left_out = set(modules.redundant)
+        self.names_free = dynamics.free
+        self._accelerate = _evaluator(dynamics.accelerations, self.n, inputs.p)
+        self._correct = _evaluator(dynamics.corrections, self.n, inputs.p)
+        left_out = set(dynamics.redundant)
         rows = [k for k, name in enumerate(self.code.equations) if name not in left_out]
         self.independent = np.array(rows, dtype=int)
         self.evaluations = self.jacobians = 0
         # By what part of their terms planned accelerations missed their equations where a state was
         # led back last, and whether they are solved for with pivots.
         self.missed, self.is_pivoted = 0.0, False
-        self._modules = modules
         self._slopes: _Slopes | None = None
         self.measure_at(inputs.guess, float(inputs.t[0]))
 
     def measure_at(self, q: Array, t: float) -> None:
         """Take the scales of coordinates and equations from a position."""
-        self.joints = problem(self.code.module, self.parameters, q, t)
+        self.joints = measured(self.code, self.parameters, q, t)
 
     @property
     def scale(self) -> Array:
@@ -91,7 +87,7 @@ class Equations:
 
         Elimination that was planned may miss its equations where masses are of very different size.
         """
-        n, rows, own, p = self.n, self.independent, self.code.module, self.parameters
+        n, rows, own, p = self.n, self.independent, self.code, self.parameters
         q, q_dot = y[:n], y[n : 2 * n]
         point, nothing = self.point(q, t), np.full(n + 1, np.nan)
         Q = np.asarray(own.Q(q, q_dot, t, p))
@@ -100,7 +96,7 @@ class Equations:
         Phi_q, size = point.Phi_q[rows], n + rows.size
         matrix = np.zeros((size, size))
         matrix[:n, :n], matrix[:n, n:], matrix[n:, :n] = self.inertia(q, t), Phi_q.T, Phi_q
-        sides = np.concatenate((Q, self.code.gamma(q, q_dot, t, p)[rows]))
+        sides = np.concatenate((Q, own.gamma(q, q_dot, t, p)[rows]))
         powers = powers_of_rows(matrix)
         try:
             found = np.linalg.solve(powers[:, np.newaxis] * matrix, powers * sides)
@@ -137,7 +133,7 @@ class Equations:
         """Return the derivatives of the rate of a state by the state, shape (2 n + 1, 2 n + 1)."""
         self.jacobians += 1
         if self._slopes is None:
-            self._slopes = _Slopes(self._modules, len(self.code.equations), self.parameters, self.n)
+            self._slopes = _Slopes(self.code, self.parameters, self.n)
         return self._slopes.jacobian(t, y)
 
     def corrected(self, t: float, y: Array) -> tuple[Array, float]:
@@ -175,7 +171,7 @@ class Equations:
 
     def inertia(self, q: Array, t: float) -> Array:
         """Return M."""
-        return np.asarray(self.code.module.M(q, t, self.parameters))
+        return np.asarray(self.code.M(q, t, self.parameters))
 
     def demanded(self, q: Array, t: float) -> Array:
         """Return how fast independent equations demand that movements be, all to one scale."""
@@ -189,9 +185,9 @@ class Equations:
 class _Slopes:
     """The linear system that the derivatives of accelerations and power solve, evaluated."""
 
-    def __init__(self, modules: DynamicModules, m: int, p: Array, n: int) -> None:
-        module, places, numbers = modules.slopes()
-        self._evaluate = _evaluator(module, n, p)
+    def __init__(self, code: Compiled, p: Array, n: int) -> None:
+        slopes, places, numbers = code.request(SLOPES)
+        self._evaluate, m = _evaluator(slopes, n, p), len(code.equations)
         self._n, self._size, size = n, n + m + 1, n + m + 1 + 2 * n
         self._system = np.zeros((self._size, size))
         for (row, column), number in numbers.items():
@@ -212,19 +208,18 @@ class _Slopes:
         return found
 
 
-def _evaluator(module: ModuleType, n: int, p: Array) -> Evaluate:
-    """Return what gives the outputs of a module at a state (2 n + 1,), NaN where there are none."""
-    size = len(module.OUTPUTS)
-    compiled = vars(module).get("observe_into")
-    if compiled is not None:
-        return _compiled(compiled, n, size, p)
-    observe, floats, numbers = module.LANES["observe"], module.FLOATS, p.tolist()
+def _evaluator(code: Compiled, n: int, p: Array) -> Evaluate:
+    """Return what gives the outputs of some code at a state (2 n + 1,), NaN where it has none."""
+    size, observe, numbers = len(code.outputs), code.observe_floats, p.tolist()
+    if observe is None:
+        assert code.observe_into is not None
+        return _compiled(code.observe_into, n, size, p)
 
     def evaluate(y: Array, t: float) -> Array:
         values = y.tolist()
         q_dot = values[n : 2 * n]
         try:
-            return np.array(observe(floats, values[:n], q_dot, q_dot, t, numbers))
+            return np.array(observe(values[:n], q_dot, q_dot, t, numbers))
         except (ArithmeticError, ValueError):
             return np.full(size, np.nan)
 

@@ -85,8 +85,6 @@ class Watch:
         smooth: bool,
     ) -> None:
         self._equations, self._inputs, self._smooth = equations, inputs, smooth
-        module = inputs.code.module
-        self._outputs: tuple[str, ...] = getattr(module, "OUTPUTS", ())
         given = [*_asked(PASSAGE, mapping_of(events, "events")),
                  *_asked(STOP, mapping_of(stops, "stops"))]  # fmt: skip
         self._kinds = [kind for kind, _, _ in given]
@@ -95,7 +93,7 @@ class Watch:
         self._signs = np.zeros(len(given))
 
     def _checked(self, names: list[str]) -> list[str]:
-        known = (*self._inputs.code.coordinates, *self._outputs)
+        known = (*self._inputs.code.coordinates, *self._inputs.code.outputs)
         found = [column_name(name) for name in names]
         if missing := [name for name in found if name not in known]:
             near = suggestion(missing[0], known) or "."
@@ -156,9 +154,9 @@ class Watch:
         n, code = self._equations.n, self._inputs.code
         q, q_dot = y[:n], y[n : 2 * n]
         known = dict(zip(code.coordinates, q.tolist(), strict=True))
-        if self._outputs:
-            values = code.module.observe(q, q_dot, np.zeros(n), t, self._inputs.p)[0]
-            known |= zip(self._outputs, np.asarray(values).tolist(), strict=True)
+        if code.outputs:
+            values = code.observe(q, q_dot, np.zeros(n), t, self._inputs.p)[0]
+            known |= zip(code.outputs, np.asarray(values).tolist(), strict=True)
         return np.asarray([known[name] for name in self._names] - self._values)
 
     def _located(self, k: int, t0: float, t1: float, state: States) -> Event:

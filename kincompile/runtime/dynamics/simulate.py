@@ -19,7 +19,7 @@ import numpy as np
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.errors import InputError, SolveError
 from kincompile.names import force_units, listed
-from kincompile.runtime.dynamics.equations import Equations, dynamic_modules
+from kincompile.runtime.dynamics.equations import Equations, dynamics_of
 from kincompile.runtime.dynamics.happenings import Watch
 from kincompile.runtime.dynamics.integrate import Integration
 from kincompile.runtime.dynamics.start import (
@@ -130,13 +130,13 @@ def simulate(
     inputs = read_inputs(
         module, t, p, guess, TOLERANCE, MAX_ITERATIONS, None, through, may_move=True
     )
-    modules = dynamic_modules(module)
-    names = inputs.code.coordinates
+    code = inputs.code
+    dynamics, names = dynamics_of(code), code.coordinates
     _check(inputs, rtol, atol, max_step)
     held = given_values(names, position, 0, "position")
     rates = {}
     if isinstance(velocity, Mapping):
-        known = (*names, *moving(module)[1]) if inputs.code.covers.size else names
+        known = (*names, *moving(code)[1]) if code.covers.size else names
         rates = given_values(known, velocity, 1, "velocity")
         velocity = None
     elif velocity is not None and np.shape(velocity) != (len(names),):
@@ -145,7 +145,7 @@ def simulate(
             f"each of {listed(names)}, or a dict of those that are given."
         )
     with np.errstate(all="ignore"):
-        equations = Equations(inputs, modules)
+        equations = Equations(inputs, dynamics)
         watch = Watch(equations, inputs, events, stops, smooth=through is not None)
         integration = Integration(equations, inputs, watch, progress)
         try:
@@ -170,7 +170,7 @@ def _check(inputs: Inputs, rtol: Any, atol: Any, max_step: Any) -> None:
         for name, value in (("rtol", rtol), ("atol", atol), ("max_step", max_step))
         if value is not None and not (isinstance(value, int | float | np.number) and value > 0)
     ]
-    times, names = inputs.t, getattr(inputs.code.module, "OUTPUTS", ())
+    times, names = inputs.t, inputs.code.outputs
     if times.size < 2 or times[0] == times[-1]:
         problems.append("t has no span: give the time of the start and at least one other time.")
     if taken := {*ADDED}.intersection((*names, *inputs.code.coordinates)):

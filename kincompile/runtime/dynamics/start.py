@@ -14,17 +14,15 @@ from kincompile.criteria import HALF, RANK
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, rate, suggestion
 from kincompile.runtime.corrector import nearest
-from kincompile.runtime.engine.code import JOINT_POINTS
 from kincompile.runtime.inputs import mapping_of
 from kincompile.runtime.singular.reach import missed
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from types import ModuleType
 
     from kincompile.runtime.dynamics.equations import Equations
-    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.inputs import Values
 
@@ -120,12 +118,10 @@ def velocity_at(
     return np.asarray(near + scale * found)
 
 
-def moving(module: ModuleType) -> tuple[ModuleType, tuple[str, ...]]:
+def moving(code: Compiled) -> tuple[Compiled, tuple[str, ...]]:
     """Return what has velocities beside the coordinates: angular velocities in space."""
-    compiled = vars(module).get(JOINT_POINTS)
-    own = module if compiled is None else compiled()
-    names = tuple(name for name in getattr(own, "OUTPUTS", ()) if name.startswith("omega_"))
-    return own, names
+    points = code.points()
+    return points, tuple(name for name in points.outputs if name.startswith("omega_"))
 
 
 def _rates(equations: Equations, point: Point, names: Sequence[str]) -> Array:
@@ -135,15 +131,14 @@ def _rates(equations: Equations, point: Point, names: Sequence[str]) -> Array:
     """
     n, own = point.q.size, equations.code.coordinates
     rows = np.zeros((len(names), n))
-    module = None
     for k, name in enumerate(names):
         if name in own:
             rows[k, own.index(name)] = 1.0
             continue
-        module = module or moving(equations.code.module)[0]
-        place, unit = module.OUTPUTS.index(name), np.eye(n)
+        points = equations.code.points()
+        place, unit = points.outputs.index(name), np.eye(n)
         q, t = np.broadcast_to(point.q, (n, n)), np.full(n, point.t)
-        rows[k] = np.asarray(module.observe(q, unit, 0 * unit, t, equations.parameters)[0])[
+        rows[k] = np.asarray(points.observe(q, unit, 0 * unit, t, equations.parameters)[0])[
             :, place
         ]
     return rows

@@ -22,7 +22,7 @@ from kincompile.criteria import SOLVED
 from kincompile.runtime.engine.equal_blocks import EqualBlocks
 
 if TYPE_CHECKING:
-    from kincompile.runtime.engine.code import Code
+    from kincompile.runtime.engine.code import Compiled
     from kincompile.runtime.engine.equal_blocks import Array, Factors, Index
 
 LARGEST_BLOCK, MOST_KINDS, LARGEST_BAND = 40, 100, 200
@@ -50,7 +50,7 @@ class BlockSolver:
     `pivoted` counts how often the blocks lost too many digits, and SuperLU took their place.
     """
 
-    def __init__(self, code: Code) -> None:
+    def __init__(self, code: Compiled) -> None:
         from scipy.linalg import get_lapack_funcs
 
         row_order, column_order, sizes, varies = code.blocks

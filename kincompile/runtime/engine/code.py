@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,36 +12,35 @@ from numpy.typing import NDArray
 from kincompile.criteria import SPATIAL_COORDINATES, covers, may_turn, turning
 from kincompile.errors import InputError, StructuralError, UnsupportedError
 from kincompile.names import listed
+from kincompile.quantities import pattern_of
+from kincompile.runtime.contract import functions, present_in
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
     from types import ModuleType
+
+    from kincompile.quantities import Quantity
 
 Array = NDArray[np.float64]
 
 PLACE = "_code"
-"""Where a module keeps its `Code`."""
+"""Where a module keeps its `Compiled`."""
 
-JOINT_POINTS = "_joint_points"
-"""Where a module keeps the function that compiles the points of its joints, on request."""
+T = TypeVar("T")
 
-WRITTEN = "_written_position"
-"""Where a compiled module keeps the `position` that was emitted in Python."""
 
-SENSITIVITIES = "_sensitivities"
-"""Where a module keeps its `SensitiveModules`."""
+@dataclass(frozen=True, slots=True)
+class Kind(Generic[T]):
+    """What of a mechanism is compiled when it is first asked for."""
 
-FORCES = "_forces"
-"""Where a module of a mechanism with loads keeps what compiles its forces, on request."""
+    name: str
+    # Of a module in grouped form, what it lacks; of one from a file, what to do with the model.
+    grouped: str = ""
+    then: str = ""
 
-DYNAMICS = "_dynamics"
-"""Where a module of a mechanism with loads keeps what compiles its equations of motion."""
 
-UNDRIVEN = "_undriven"
-"""Where a module keeps the function that says which drivers are missing, "" if none are."""
-
-DRIVERS = "_drivers"
-"""Where a module keeps the function that describes its drivers at a time and parameters."""
+Place = tuple[int, int]
+"""Row and column."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,65 +59,19 @@ class LaneFunctions:
     arrays: Any
 
 
-@dataclass(frozen=True, slots=True)
-class SensitiveModules:
-    """What compiles a mechanism's sensitivities to parameters on request, and keeps them."""
-
-    # Takes names of parameters and of columns, and whether second derivatives are wanted, to a
-    # module without equations whose outputs are by what part of their terms solves miss their
-    # equations, the determinants of the blocks of Phi_q, then by parameter, and by pair of them,
-    # the derivatives of the columns; None where there is no planned elimination.
-    observing: Callable[[tuple[str, ...], tuple[str, ...], bool], ModuleType | None]
-    # Takes names of parameters to the module of the mechanism with its sensitivities.
-    larger: Callable[[tuple[str, ...]], ModuleType]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class ForceModules:
-    """What compiles the forces of a mechanism on request, and keeps them."""
-
-    # Takes whether multipliers are to be solved for to a module without equations whose outputs are
-    # by what part of its terms the solve misses its equations, the determinants of the blocks of
-    # Phi_q and the multipliers, then the forces, without rates; None where there is no planned
-    # elimination. Else it gives the forces alone, and multipliers are its last parameters.
-    compiled: Callable[[bool], ModuleType | None]
-    # The bodies of each constraint, by name; none of a free equation.
-    joints: Mapping[str, tuple[str, ...]]
-
-
-Place = tuple[int, int]
-"""Row and column."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DynamicModules:
-    """The equations of motion of a mechanism, compiled."""
-
-    # A module without equations whose outputs are the accelerations, then the power of loads and
-    # drivers.
-    accelerations: ModuleType
-    # The same, of changes of the coordinates and then of the rates that lead a state back to its
-    # constraints, and by what part of their terms the accelerations there miss their equations.
-    corrections: ModuleType
-    # Compiles on request, and keeps, a module whose outputs are entries of the linear system of the
-    # derivatives of accelerations and power by q and q_dot, with their rows and columns, and the
-    # entries that are plain numbers.
-    slopes: Callable[[], tuple[ModuleType, Sequence[Place], Mapping[Place, float]]]
-    redundant: tuple[str, ...]  # names of equations that repeat others and are left out
-    free: tuple[str, ...]  # coordinates that may be given, as many as there are degrees of freedom
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Code:
-    """An emitted module."""
+class Compiled:
+    """An emitted module, read once: what the package works with instead of the module."""
 
     module: ModuleType  # the module itself, for messages and for users
-    # name, coordinates, equations, parameters, units: names and units, as in the contract
+    # name, coordinates, equations, parameters, outputs, units: as in the contract
     name: str
     coordinates: tuple[str, ...]
     equations: tuple[str, ...]
     parameters: tuple[str, ...]
+    outputs: tuple[str, ...]
     units: Mapping[str, str]
+    defaults: Array  # (k,): parameters where none are given
     guess: Array  # (n,): where Newton starts
     pattern: NDArray[np.signedinteger[Any]]  # (nnz, 2): rows and columns of Phi_q's entries
     # Of each body its name, the number of its first coordinate, and how many it has.
@@ -136,8 +90,7 @@ class Code:
     covers: NDArray[np.signedinteger[Any]]
     # (n,), bool: which are angles, or may be: a free coordinate has no unit that says so
     may_turn: NDArray[np.bool_]
-    # position, nu, gamma, Phi_q, nonzeros: functions of the contract; `nonzeros` is
-    # ``Phi_q_nonzeros``
+    # position, nu, gamma, Phi_q, nonzeros: functions of the contract; the last is Phi_q_nonzeros
     position: Callable[..., tuple[Array, Array]]
     nu: Callable[..., Array]
     gamma: Callable[..., Array]
@@ -145,6 +98,17 @@ class Code:
     nonzeros: Callable[..., Array]
     # `position` as it was emitted in Python, where compiled code has taken its place.
     written: Callable[..., tuple[Array, Array]]
+    functions: Mapping[str, Callable[..., Any]]  # all of the contract that it has, by name
+    # M, Q, Q_q, Q_q_dot, observe, outputs_q: functions of a module with loads, or with outputs
+    M: Callable[..., Array]
+    Q: Callable[..., Array]
+    Q_q: Callable[..., Array]
+    Q_q_dot: Callable[..., Array]
+    observe: Callable[..., tuple[Array, Array, Array]]
+    outputs_q: Callable[..., Array]
+    quantities: tuple[Quantity, ...]  # what it has functions of
+    patterns: Mapping[str, NDArray[np.signedinteger[Any]]]  # as `pattern`, of each matrix
+    has_loads: bool  # whether it has M, Q and their derivatives
     redundant: tuple[str, ...]  # names of the equations that repeat others, and agree with them
     # Why the equations cannot determine the coordinates; "" where they can, or nobody says.
     unsolvable: str
@@ -161,11 +125,40 @@ class Code:
     march_variants: Callable[..., int] | None
     # Of a module with outputs: puts them and their rates at states (n, N) into (3, r, N).
     observe_into: Callable[..., None] | None
+    # Of a module with outputs: gives them at one state of plain floats, (q, q_dot, q_ddot, t, p);
+    # None where its functions are compiled.
+    observe_floats: Callable[..., Sequence[float]] | None
+    # What compiles more of the mechanism, and what it has compiled, by kind and key.
+    makers: dict[Kind[Any], Callable[..., Any]]
+    made: dict[tuple[Kind[Any], Hashable], Any]
+
+    def request(self, kind: Kind[T], *key: Hashable) -> T:
+        """Return what is compiled on request, once for each key; or say why it cannot be."""
+        if (kind, key) not in self.made:
+            self.made[kind, key] = self._maker(kind)(*key)
+        found: T = self.made[kind, key]
+        return found
+
+    def _maker(self, kind: Kind[Any]) -> Callable[..., Any]:
+        if kind in self.makers:
+            return self.makers[kind]
+        if self.evaluate is not None:
+            raise UnsupportedError(
+                f"{self.name} is in grouped form, as large mechanisms are, {kind.grouped} use "
+                "form='inline'."
+            )
+        raise InputError(
+            f"the module of {self.name} was loaded from a file, which knows no more than its own "
+            f"functions: compile the model, {kind.then}."
+        )
+
+    def points(self) -> Compiled:
+        """Return what has the points of the joints as outputs; of a file what it has itself."""
+        return self.request(POINTS) if POINTS in self.makers else self
 
     def undriven(self) -> str:
         """Return which drivers are missing, where equations depend on others everywhere; or ""."""
-        describe = vars(self.module).get(UNDRIVEN)
-        return str(describe()) if describe else ""
+        return self.request(UNDRIVEN) if UNDRIVEN in self.makers else ""
 
     def owners(self) -> dict[str, str]:
         """Return the body of each coordinate; one that belongs to none stands for itself."""
@@ -175,59 +168,122 @@ class Code:
         return owners
 
 
-def code_of(module: ModuleType) -> Code:
-    """Return a module's `Code`, which the loader has put there; made now for any other module."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Dynamics:
+    """The equations of motion of a mechanism, compiled."""
+
+    # Without equations; its outputs are the accelerations, then the power of loads and drivers.
+    accelerations: Compiled
+    # The same, of changes of the coordinates and then of the rates that lead a state back to its
+    # constraints, and by what part of their terms the accelerations there miss their equations.
+    corrections: Compiled
+    redundant: tuple[str, ...]  # names of equations that repeat others and are left out
+    free: tuple[str, ...]  # coordinates that may be given, as many as there are degrees of freedom
+
+
+POINTS: Kind[Compiled] = Kind("points")
+"""Without equations; its outputs are the points of the joints."""
+
+UNDRIVEN: Kind[str] = Kind("undriven")
+"""Which drivers are missing, "" if none are."""
+
+DRIVERS: Kind[Callable[[float, Array], Sequence[tuple[Any, ...]]]] = Kind("drivers")
+"""What describes the drivers at a time and parameters."""
+
+SENSITIVITIES: Kind[Compiled | None] = Kind(
+    "sensitivities",
+    "and that has no sensitivities: differentiate a part of it, or",
+    "solve with that, then ask for sensitivities",
+)
+"""By names of parameters, of columns, and whether second derivatives are wanted; without equations.
+Its outputs are by what part of their terms solves miss their equations, the determinants of the
+blocks of Phi_q, then by parameter, and by pair of them, the derivatives of the columns; None where
+there is no planned elimination."""
+
+SENSITIVE: Kind[Compiled] = Kind("sensitive", SENSITIVITIES.grouped, SENSITIVITIES.then)
+"""By names of parameters, the mechanism with its sensitivities."""
+
+FORCES: Kind[Compiled | None] = Kind(
+    "forces", "whose forces are not compiled:", "solve with that, then ask for forces"
+)
+"""By whether multipliers are to be solved for; without equations. Its outputs are by what part of
+its terms the solve misses its equations, the determinants of the blocks of Phi_q and the
+multipliers, then the forces, without rates; None where there is no planned elimination. Else it
+gives the forces alone, and multipliers are its last parameters."""
+
+JOINTS: Kind[Mapping[str, tuple[str, ...]]] = Kind("joints", FORCES.grouped, FORCES.then)
+"""The bodies of each constraint, by name; none of a free equation."""
+
+DYNAMICS: Kind[Dynamics] = Kind(
+    "dynamics", "whose equations of motion are not compiled:", "and simulate that"
+)
+
+SLOPES: Kind[tuple[Compiled, Sequence[Place], Mapping[Place, float]]] = Kind("slopes")
+"""Without equations; its outputs are entries of the linear system of the derivatives of
+accelerations and power by q and q_dot. With their rows and columns, and the entries that are plain
+numbers."""
+
+
+MORE = ("kinematics_batch_last", "solve")
+"""Functions that are those of no quantity; only some modules have a solve."""
+
+TYPED = "position", "nu", "gamma", "Phi_q", "M", "Q", "Q_q", "Q_q_dot", "observe", "outputs_q"
+"""Functions that are attributes: None where a module without loads or outputs has none."""
+
+
+def code_of(module: ModuleType) -> Compiled:
+    """Return a module as it was read, by the loader; read now for any other module."""
     found = vars(module).get(PLACE)
-    return found if isinstance(found, Code) else attach(module)
+    return found if isinstance(found, Compiled) and found.module is module else attach(module)
 
 
-def on_request(module: ModuleType, place: str, grouped: str, then: str) -> Any:
-    """Return what compiles more of a mechanism, from its place in the module; or say why not."""
-    found = vars(module).get(place)
-    if found is not None:
-        return found
-    if code_of(module).evaluate is not None:
-        raise UnsupportedError(
-            f"{module.NAME} is in grouped form, as large mechanisms are, {grouped} use "
-            "form='inline'."
-        )
-    raise InputError(
-        f"the module of {module.NAME} was loaded from a file, which knows no more than its own "
-        f"functions: compile the model, {then}."
-    )
+def attach(module: ModuleType, written: Callable[..., Any] | None = None) -> Compiled:
+    """Read a module, and keep that in it. To be called again when its functions change."""
+    code = read(module, written)
+    if (found := vars(module).get(PLACE)) is not None:
+        code.makers.update(found.makers)
+    vars(module)[PLACE] = code
+    return code
 
 
-def attach(module: ModuleType) -> Code:
-    """Read what a module has, and keep it there. To be called again when its functions change."""
+def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compiled:
+    """Return what a module has, typed; with the `position` that compiled code has replaced."""
     names = vars(module)
-    lanes = names.get("LANES", {})
-    coordinates = names["COORDINATES"]
-    places = [range(first, first + count) for _, first, count in names.get("BODIES", ())]
-    entries = _entries(names)
+    quantities, lanes = present_in(names), names.get("LANES", {})
+    coordinates, bodies = names["COORDINATES"], names.get("BODIES", ())
+    places = [range(first, first + count) for _, first, count in bodies]
     units = [names["UNITS"][name] for name in coordinates]
-    code = Code(
+    given, entries = (names["GUESS"] != 0).tolist(), _entries(names)
+    known = {name: names[name] for name in (*functions(names), *MORE) if name in names}
+    typed: dict[str, Any] = {name: known.get(name) for name in TYPED}
+    patterns = {item.name: pattern_of(item) for item in quantities if item.is_matrix}
+    observe = lanes.get("observe") if "observe_into" not in names else None
+    return Compiled(
         module=module,
         name=names["NAME"],
         coordinates=coordinates,
         equations=names["EQUATIONS"],
         parameters=names["PARAMETERS"],
+        outputs=names.get("OUTPUTS", ()),
         units=names["UNITS"],
+        defaults=names["DEFAULTS"],
         guess=names["GUESS"],
         pattern=names["PATTERN"],
-        bodies=names.get("BODIES", ()),
+        bodies=bodies,
         entries=entries,
         constant=_constant(entries, len(names["EQUATIONS"]), len(coordinates)),
         varying=_varying(entries),
-        without_guess=_without_guess(names),
+        without_guess=tuple(body for body, k, n in bodies if not any(given[k : k + n])),
         angular=np.array(turning(units, places), dtype=bool),
         covers=np.array(covers(places), dtype=int).reshape(-1, SPATIAL_COORDINATES - 3),
         may_turn=np.array(may_turn(units, places), dtype=bool),
-        position=names["position"],
-        nu=names["nu"],
-        gamma=names["gamma"],
-        Phi_q=names["Phi_q"],
         nonzeros=names["Phi_q_nonzeros"],
-        written=names.get(WRITTEN, names["position"]),
+        written=written or names["position"],
+        functions=known,
+        quantities=quantities,
+        patterns={name: names[place] for name, place in patterns.items() if place in names},
+        has_loads="LOADS" in names,
+        **typed,
         redundant=names.get("REDUNDANT", ()),
         unsolvable=names.get("UNSOLVABLE", ""),
         corners=names.get("CORNERS", False),
@@ -243,9 +299,10 @@ def attach(module: ModuleType) -> Code:
         march=names.get("march"),
         march_variants=names.get("march_variants"),
         observe_into=_observing(names, lanes),
+        observe_floats=observe and partial(observe, names["FLOATS"]),
+        makers={},
+        made={},
     )
-    names[PLACE] = code
-    return code
 
 
 STRIP = 5000
@@ -304,14 +361,7 @@ def _varying(
     return tuple((column, tuple(rows)) for column, rows in columns.items())
 
 
-def _without_guess(names: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the bodies whose guess is zero throughout."""
-    given = np.concatenate(((0,), np.cumsum(names["GUESS"] != 0))).tolist()
-    bodies = names.get("BODIES", ())
-    return tuple(body for body, first, size in bodies if given[first] == given[first + size])
-
-
-def require_square(code: Code) -> None:
+def require_square(code: Compiled) -> None:
     """Refuse a module whose equations cannot determine its coordinates.
 
     What the compiler has written into the module says why; else they are counted.

@@ -15,7 +15,7 @@ from kincompile.runtime.engine.scales import Point
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from kincompile.runtime.engine.code import Array, Code
+    from kincompile.runtime.engine.code import Array, Compiled
 
 LARGEST_CAREFUL = 1000
 """Coordinates up to which a large mechanism is left to dense matrices where the blocks fail: there
@@ -34,7 +34,7 @@ class Dense(Linear):
     point before. With `is_written` code in Python evaluates Phi and Phi_q of a compiled module too.
     """
 
-    def __init__(self, code: Code, p: Array, *, is_written: bool = False) -> None:
+    def __init__(self, code: Compiled, p: Array, *, is_written: bool = False) -> None:
         self.code, self._p = code, p
         self._position = code.written if is_written else code.position
         self.is_written = self._position is code.written

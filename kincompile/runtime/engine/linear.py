@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from kincompile.criteria import AGREEMENT, SOLVED, TINY
 
 if TYPE_CHECKING:
-    from kincompile.runtime.engine.code import Code
+    from kincompile.runtime.engine.code import Compiled
     from kincompile.runtime.engine.scales import Point, Scales
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ class Linear(ABC):
     No method raises on numbers: what cannot be had is not finite.
     """
 
-    code: Code
+    code: Compiled
 
     @abstractmethod
     def evaluate(self, q: Array, t: Any) -> Point:

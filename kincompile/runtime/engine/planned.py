@@ -15,7 +15,7 @@ from kincompile.runtime.engine.linear import Linear, Rates, sizes_of
 from kincompile.runtime.engine.scales import Point
 
 if TYPE_CHECKING:
-    from kincompile.runtime.engine.code import Array, Code, LaneFunctions
+    from kincompile.runtime.engine.code import Array, Compiled, LaneFunctions
     from kincompile.runtime.engine.scales import Scales
 
 Lanes = Sequence[Any] | NDArray[np.float64]
@@ -32,7 +32,7 @@ SEED = 1989
 class Planned(Linear):
     """An engine whose linear systems go by the elimination that was planned at compile time."""
 
-    code: Code  # a module with a planned solve
+    code: Compiled  # a module with a planned solve
     p: Lanes  # (k,) or (k, N), or sequence of float: parameters, of all points or a set for each
     # The module's elementary functions of floats, where positions are lists of floats: one of them
     # then takes as long as a few calls of NumPy. None for those of arrays.

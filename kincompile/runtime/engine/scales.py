@@ -27,7 +27,7 @@ from kincompile.criteria import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from kincompile.runtime.engine.code import Array, Code
+    from kincompile.runtime.engine.code import Array, Compiled
 
 
 @dataclass(slots=True, eq=False)
@@ -49,7 +49,7 @@ class Point:
 class Scales:
     """The criteria in use for a mechanism with n coordinates and m equations."""
 
-    code: Code
+    code: Compiled
     angular: np.ndarray[tuple[int], np.dtype[np.bool_]]  # (n,), bool: which coordinates are angles
     size: float  # the size of the mechanism
     # (n,): scale of each coordinate: 1 rad for angles, the size of the mechanism for the others

@@ -11,13 +11,13 @@ from kincompile.runtime.engine.linear import Linear, Rates
 from kincompile.runtime.engine.scales import Point
 
 if TYPE_CHECKING:
-    from kincompile.runtime.engine.code import Array, Code
+    from kincompile.runtime.engine.code import Array, Compiled
 
 
 class Sparse(Linear):
     """An engine of one point at a time, in grouped form: Phi_q is the entries of its pattern."""
 
-    def __init__(self, code: Code, p: Array) -> None:
+    def __init__(self, code: Compiled, p: Array) -> None:
         assert code.evaluate is not None
         self.code, self._p, self._evaluate = code, p, code.evaluate
         self._solver = BlockSolver(code)

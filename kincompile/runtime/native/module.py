@@ -16,8 +16,7 @@ import numpy as np
 
 from kincompile import quantities
 from kincompile.errors import InputError
-from kincompile.runtime.contract import present_in
-from kincompile.runtime.engine.code import WRITTEN, attach
+from kincompile.runtime.engine.code import attach, code_of
 from kincompile.runtime.memory import empty
 from kincompile.runtime.native.library import library
 from kincompile.runtime.native.points import (
@@ -45,6 +44,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.quantities import Quantity
+    from kincompile.runtime.engine.code import Compiled
     from kincompile.runtime.inputs import Inputs
 
     Array = NDArray[np.float64]
@@ -64,15 +64,15 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     Where the mechanism has a planned solve the module gets two more, ``march`` and
     ``march_variants``. An `UnsupportedError` says what is wrong with the compiler.
     """
-    loaded = library(module.NAME, files, module.FINGERPRINT)
-    functions = _Functions(module, loaded)
-    names = vars(module)
-    present = present_in(module)
+    code, names = code_of(module), vars(module)
+    present = code.quantities
+    loaded = library(code.name, files, names["FINGERPRINT"])
+    functions = _Functions(code, names["_batch"], loaded)
     given = {**quantities.functions(present), **_nonzeros(present)}
     compiled = {name: functions.evaluator(name, results) for name, results in given.items()}
     compiled["kinematics_batch_last"] = functions.batch_last()
     if "solve" in names:
-        compiled["solve"] = functions.solve()
+        compiled["solve"] = functions.solve(names["_system"])
         compiled["march"] = functions.march()
         compiled["march_variants"] = functions.march_variants()
     if "observe" in names:
@@ -80,9 +80,8 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     for name, function in compiled.items():
         function.__name__, function.__module__ = name, module.__name__
         function.__doc__ = function.__doc__ or names[name].__doc__
-    names[WRITTEN] = module.position
     names.update(compiled)
-    attach(module)
+    attach(module, code.position)
     return module
 
 
@@ -101,25 +100,26 @@ def _nonzeros(present: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
 class _Functions:
     """Makes the functions of a module from those of its library."""
 
-    def __init__(self, module: ModuleType, loaded: ctypes.CDLL) -> None:
-        self._module, self._library, self._name = module, loaded, module.NAME
-        self._n, self._m = module.N_COORDINATES, module.N_EQUATIONS
-        self._shapes = _shapes(module)
+    def __init__(self, code: Compiled, checked: Function, loaded: ctypes.CDLL) -> None:
+        self._code, self._checked_batch = code, checked
+        self._library, self._name = loaded, code.name
+        self._n, self._m = len(code.coordinates), len(code.equations)
+        self._shapes = _shapes(code)
         self._batch_type = batch_type(tuple(self._shapes))
         self._run = getattr(loaded, f"{self._name}_evaluate")
 
     def evaluator(self, name: str, results: tuple[str, ...]) -> Function:
         """Return a function of points (..., n) that gives some results."""
-        original, states = getattr(self._module, name), _states(name)
+        original, states = self._code.functions[name], _states(name)
         if len(states) == len(STATES):
             return self._of_second_rates(results, original)
-        places = Places(self._module, self._library, results, self._shapes, self._batch_type)
+        places = Places(self._code, self._library, results, self._shapes, self._batch_type)
         make = function_of_positions if len(states) == 1 else function_of_states
         return make(places, self._batch, original)
 
     def _of_second_rates(self, results: tuple[str, ...], original: Function) -> Function:
         """Return a function of q, q_dot, q_ddot, t and p: outputs, asked for in batches."""
-        defaults, batch = self._module.DEFAULTS, self._batch
+        defaults, batch = self._code.defaults, self._batch
 
         def of_second_rates(q: Any, q_dot: Any, q_ddot: Any, t: Any, p: Any = defaults) -> Any:
             found = batch(results, (q, q_dot, q_ddot), t, p)
@@ -135,7 +135,7 @@ class _Functions:
             if results is not None:
                 return results
         # Broadcasting, conversion and error messages are delegated to the NumPy module.
-        rows, t, p, shape = vars(self._module)["_batch"](t, p, states)
+        rows, t, p, shape = self._checked_batch(t, p, states)
         if rows[0].dtype != REAL:
             return None
         batch = self._batch_type(
@@ -150,7 +150,7 @@ class _Functions:
         shape = getattr(states[0], "shape", ())
         if not (
             all(_is_plain(state, (*shape[:-1], self._n)) for state in states)
-            and _is_plain(p, self._module.DEFAULTS.shape)
+            and _is_plain(p, self._code.defaults.shape)
             and (isinstance(t, float) or _is_plain(t, shape[:-1]))
         ):
             return None
@@ -177,7 +177,7 @@ class _Functions:
 
     def batch_last(self) -> Function:
         """Return `kinematics_batch_last`."""
-        defaults, original = self._module.DEFAULTS, self._module.kinematics_batch_last
+        defaults, original = self._code.defaults, self._code.functions["kinematics_batch_last"]
         sizes = [math.prod(self._shapes[quantity]) for quantity in BATCH_LAST]
 
         def kinematics_batch_last(
@@ -229,10 +229,10 @@ class _Functions:
             )
         return out
 
-    def solve(self) -> Function:
+    def solve(self, check: Function) -> Function:
         """Return the planned solve."""
-        original, run = self._module.solve, getattr(self._library, f"{self._name}_solve")
-        check: Function = vars(self._module)["_system"]
+        original = self._code.functions["solve"]
+        run = getattr(self._library, f"{self._name}_solve")
 
         def solve(nonzeros: Any, b: Any) -> Any:
             nonzeros, b = check(nonzeros, b)
@@ -340,21 +340,20 @@ def _fill(
     motion.residual, motion.status, motion.iterations = (array.ctypes.data for array in said)
 
 
-def _shapes(module: ModuleType) -> dict[str, tuple[int, ...]]:
+def _shapes(code: Compiled) -> dict[str, tuple[int, ...]]:
     """Return the shape of each result of compiled code, in the order of its header."""
     sizes = {
-        "equations": module.N_EQUATIONS,
-        "coordinates": module.N_COORDINATES,
-        "outputs": len(getattr(module, "OUTPUTS", ())),
-        "parameters": len(module.PARAMETERS),
+        "equations": len(code.equations),
+        "coordinates": len(code.coordinates),
+        "outputs": len(code.outputs),
+        "parameters": len(code.parameters),
     }
     shapes: dict[str, tuple[int, ...]] = {}
-    for item in present_in(module):
+    for item in code.quantities:
         shapes[item.name] = (sizes[item.rows],)
         if item.is_matrix:
             shapes[item.name] += (sizes[item.columns],)
-            pattern = "PATTERN" if item.name == "Phi_q" else f"PATTERN_{item.name}"
-            shapes[quantities.nonzeros_of(item)] = (len(getattr(module, pattern)),)
+            shapes[quantities.nonzeros_of(item)] = (len(code.patterns[item.name]),)
     return shapes
 
 

@@ -16,11 +16,9 @@ from kincompile.runtime.native.structures import REAL, Numbers, numbers_of_point
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from types import ModuleType
 
-    from numpy.typing import NDArray
+    from kincompile.runtime.engine.code import Array, Compiled
 
-    Array = NDArray[np.float64]
     Function = Callable[..., Any]
 
 COPIED: Mapping[int, Function] = {
@@ -39,19 +37,19 @@ class Places:
 
     def __init__(
         self,
-        module: ModuleType,
+        code: Compiled,
         loaded: ctypes.CDLL,
         quantities: Sequence[str],
         shapes: Mapping[str, tuple[int, ...]],
         batch_type: type[Any],
     ) -> None:
-        self.shape, self.defaults = module.GUESS.shape, module.DEFAULTS
+        self.shape, self.defaults = code.guess.shape, code.defaults
         self.quantities, self.copied = quantities, COPIED[len(quantities)]
         self._batch_type = batch_type
         self._shapes = [shapes[quantity] for quantity in quantities]
         # To give up the interpreter's lock for a point would take longer than the point.
         prototype = ctypes.PYFUNCTYPE(c_int, c_void_p)
-        self.run: Function = prototype((f"{module.NAME}_evaluate", loaded))
+        self.run: Function = prototype((f"{code.name}_evaluate", loaded))
         self.free = [self.new()]
 
     def new(self) -> tuple[Array, Array, c_double, Array, list[Array], Any, Any]:

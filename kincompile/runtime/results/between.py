@@ -15,18 +15,15 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 import numpy as np
 
 from kincompile.criteria import MAX_CORRECTIONS, SLIGHT, TOLERANCE
-from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, State, all_hold
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import measured
 from kincompile.runtime.singular.events import quintic
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.results.columns import MotionTable
 
 T = TypeVar("T")
@@ -42,7 +39,7 @@ APART = 1e-5
 class ObservedMotion:
     """Outputs over rising times (N,), and between them."""
 
-    def __init__(self, solution: MotionTable, module: ModuleType, p: Array) -> None:
+    def __init__(self, solution: MotionTable, code: Compiled, p: Array) -> None:
         own = solution.observed
         good = np.flatnonzero(np.isfinite(solution.q_dot).all(axis=1))
         self.t, order = np.unique(solution.t[good], return_index=True)
@@ -56,11 +53,11 @@ class ObservedMotion:
         for k in np.flatnonzero(~self.emitted).tolist():
             y_dot[:, k] = derivative(self.t, y[:, k])
         self.span = float(self.t[-1] - self.t[0])
-        self._solution, self._module, self.p = solution, module, p
+        self._solution, self._code, self.p = solution, code, p
         on_grid = np.array((self.y, self.y_dot, self.y_ddot)).transpose(1, 0, 2)
         self.known: dict[float, Array] = dict(zip(self.t.tolist(), on_grid, strict=True))
         self._states: dict[int, State | None] = {}
-        self._is_free = len(module.EQUATIONS) < len(solution.coordinates)
+        self._is_free = len(code.equations) < len(solution.coordinates)
         self._scales = self._largest()
 
     def scale(self, k: int) -> float:
@@ -107,7 +104,7 @@ class ObservedMotion:
         found = np.full((3, len(self.names)), np.nan)
         if motion is not None:
             with np.errstate(all="ignore"):
-                found = np.array(self._module.observe(*motion, t, self.p))
+                found = np.array(self._code.observe(*motion, t, self.p))
         self.known[t] = found
 
     def _followed(self, t: float) -> tuple[Array, Array, Array] | None:
@@ -145,7 +142,7 @@ class ObservedMotion:
     def march(self) -> March:
         """What follows the motion."""
         start = self.position(0)
-        equations = problem(self._module, self.p, start, self.t[0], sparse=True)
+        equations = measured(self._code, self.p, start, self.t[0], sparse=True)
         return March(equations, equations.engine, TOLERANCE)
 
     def nearest(self, t: float) -> int:
@@ -197,7 +194,7 @@ def together(motions: Sequence[ObservedMotion], asking: Sequence[Between[T]]) ->
 def _look_together(wanted: Sequence[tuple[ObservedMotion, float]]) -> None:
     """Find outputs, each of a motion at a time; what is out of the ordinary by itself."""
     good = np.zeros(len(wanted), dtype=bool)
-    code = code_of(wanted[0][0].march.equations.code.module) if len(wanted) > FEW else None
+    code = wanted[0][0].march.equations.code if len(wanted) > FEW else None
     if code is not None and code.lanes is not None and code.observe_into is not None:
         places = [motion.nearest(t) for motion, t in wanted]
         pairs = [(motion, place) for (motion, _), place in zip(wanted, places, strict=True)]
@@ -210,7 +207,7 @@ def _look_together(wanted: Sequence[tuple[ObservedMotion, float]]) -> None:
             state, checks = march.complete(march.engine.evaluate(q, begin))
             following, is_near, _ = march.step_together(state, times, MAX_CORRECTIONS)
             good = all_hold(is_near, checks)
-            seen = np.empty((3, len(code.module.OUTPUTS), times.size))
+            seen = np.empty((3, len(code.outputs), times.size))
             states = following.point.q, following.q_dot, following.q_ddot
             code.observe_into(states, times, p, seen)
         for number in np.flatnonzero(good).tolist():

@@ -14,16 +14,14 @@ import numpy as np
 
 from kincompile.names import listed
 from kincompile.runtime.engine.code import DRIVERS
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import measured
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.singular.events import BIFURCATION, LOCK_UP, involved
 from kincompile.runtime.singular.reach import freed_curve
 from kincompile.tables import table
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
-    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.problem import Problem
     from kincompile.runtime.results.columns import MotionTable
 
@@ -107,16 +105,15 @@ class DriverRange:
     high: Limit
 
 
-def driver_ranges(solution: MotionTable, module: ModuleType, p: Array) -> tuple[DriverRange, ...]:
+def driver_ranges(solution: MotionTable, code: Compiled, p: Array) -> tuple[DriverRange, ...]:
     """Return the range of every driver from the first position of a motion."""
-    describe = vars(module).get(DRIVERS)
     q, t = np.ascontiguousarray(solution.q[0]), float(solution.t[0])
-    is_square = len(module.EQUATIONS) == q.size <= LARGEST_FREED
-    if describe is None or not is_square or not np.isfinite(solution.q_ddot[0]).all():
+    is_square = len(code.equations) == q.size <= LARGEST_FREED
+    if DRIVERS not in code.makers or not is_square or not np.isfinite(solution.q_ddot[0]).all():
         return ()
     with np.errstate(all="ignore"):
-        equations = problem(module, p, q, t)
-        drivers = [Driver(*item) for item in describe(t, p)]
+        equations = measured(code, p, q, t)
+        drivers = [Driver(*item) for item in code.request(DRIVERS)(t, p)]
         return tuple(_range(equations, driver, q, t) for driver in drivers)
 
 

@@ -17,7 +17,7 @@ from kincompile.criteria import HALF, RANK, TINY, probe_of
 from kincompile.errors import InputError, SingularConfigurationWarning
 from kincompile.html import Shown
 from kincompile.names import listed, multiplier
-from kincompile.runtime.engine.code import FORCES, code_of, on_request
+from kincompile.runtime.engine.code import FORCES, JOINTS, code_of
 from kincompile.runtime.engine.dense import powers_of_rows
 from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.memory import empty
@@ -28,13 +28,12 @@ from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.tables import indented, table
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from types import ModuleType
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.code import Array, Code, ForceModules
+    from kincompile.runtime.engine.code import Array, Compiled
 
 BALANCED = 1e-7
 """Part of the largest force up to which the equations may be out of balance."""
@@ -301,9 +300,9 @@ def forces(solution: Solution) -> Forces:
         Where loads have no value, as a spring of length zero has no direction: forces are NaN.
     """
     require_solution(solution)
-    module = solution.require_module("its forces")
-    modules = _modules(module)
-    points = _Points.of(solution, code_of(module), modules)
+    code = code_of(solution.require_module("its forces"))
+    joints = _joints(code)
+    points = _Points.of(solution, code)
     names, units, found, shared = points.forces()
     if np.isnan(found).any() and (text := points.without_loads()):
         warnings.warn(text, SingularConfigurationWarning, stacklevel=2)
@@ -312,7 +311,7 @@ def forces(solution: Solution) -> Forces:
     added = names[m:]
     merged = solution.observed.joined(added, {name: units[name] for name in added}, values[..., m:])
     motion = solution.observing(merged)
-    return Forces(motion, added, values[..., :m], shared, dict(modules.joints))
+    return Forces(motion, added, values[..., :m], shared, dict(joints))
 
 
 def no_value(name: str, bodies: Sequence[str], t: float) -> str:
@@ -324,24 +323,21 @@ def no_value(name: str, bodies: Sequence[str], t: float) -> str:
     )
 
 
-def _modules(module: ModuleType) -> ForceModules:
-    """Return what compiles the forces of a mechanism."""
-    if not hasattr(module, "LOADS"):
+def _joints(code: Compiled) -> Mapping[str, tuple[str, ...]]:
+    """Return the bodies of each constraint; refuse a mechanism whose forces cannot be had."""
+    if not code.has_loads:
         raise InputError(
-            f"{module.NAME} has no masses and no forces, so that nothing bears a load: give its "
+            f"{code.name} has no masses and no forces, so that nothing bears a load: give its "
             "bodies masses, m.body(..., mass=..., inertia=...), or add forces such as kc.Force."
         )
-    wanted = "whose forces are not compiled:", "solve with that, then ask for forces"
-    found: ForceModules = on_request(module, FORCES, *wanted)
-    return found
+    return code.request(JOINTS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Points:
     """A batch of L points of a motion."""
 
-    code: Code
-    modules: ForceModules
+    code: Compiled
     p: Array
     t: Array
     q: Array
@@ -349,28 +345,28 @@ class _Points:
     q_ddot: Array
 
     @classmethod
-    def of(cls, solution: Solution, code: Code, modules: ForceModules) -> _Points:
+    def of(cls, solution: Solution, code: Compiled) -> _Points:
         """Return the points of a motion, of all variants one after the other."""
         shape, n = solution.q.shape[:-1], len(code.coordinates)
         p = np.array(list(solution.parameters.values()), dtype=np.float64).T
         if len(shape) > 1:
             p = np.repeat(p.reshape(shape[0], len(solution.parameters)), shape[-1], axis=0)
         states = (part.reshape(-1, n) for part in (solution.q, solution.q_dot, solution.q_ddot))
-        return cls(code, modules, p, np.broadcast_to(solution.t, shape).ravel(), *states)
+        return cls(code, p, np.broadcast_to(solution.t, shape).ravel(), *states)
 
     def at(self, some: NDArray[Any]) -> _Points:
         """Return some of the points."""
         p = self.p if self.p.ndim == 1 else self.p[some]
         states = (state[some] for state in (self.q, self.q_dot, self.q_ddot))
-        return _Points(self.code, self.modules, p, self.t[some], *states)
+        return _Points(self.code, p, self.t[some], *states)
 
     def forces(self) -> tuple[tuple[str, ...], dict[str, str], Array, tuple[str, ...]]:
         """Return names, units, values (K, L) of multipliers and forces, and what is shared."""
         names, units = self._names()
         finite = np.isfinite(self.q_ddot.sum(axis=-1))
         left = finite
-        if (module := self.modules.compiled(True)) is not None:
-            values = self.outputs_of(module, self.p)
+        if (planned := self.code.request(FORCES, True)) is not None:
+            values = self.outputs_of(planned, self.p)
             blocks = len(values) - len(names)
             found, left = values[blocks:], finite & ~trusted(values[0], values[1:blocks])
         else:
@@ -391,7 +387,7 @@ class _Points:
         code, known = self.code, np.isfinite(self.q_ddot.sum(axis=-1))
         at = self.at(np.flatnonzero(known))
         with np.errstate(all="ignore"):
-            Q = code.module.Q(at.q, at.q_dot, at.t, at.p)
+            Q = code.Q(at.q, at.q_dot, at.t, at.p)
         bad = ~np.isfinite(Q)
         if not bad.any():
             return ""
@@ -400,38 +396,34 @@ class _Points:
         t = at.t[int(np.argmax(bad.any(axis=1)))]
         return no_value(code.name, tuple(names.tolist()), float(t))
 
-    def outputs_of(self, module: ModuleType, p: Array) -> Array:
-        """Return the outputs of a module at the points, shape (K, L)."""
-        found = empty((1, len(module.OUTPUTS), self.t.size))
-        observe = code_of(module).observe_into
-        assert observe is not None
+    def outputs_of(self, code: Compiled, p: Array) -> Array:
+        """Return the outputs of some code at the points, shape (K, L)."""
+        found = empty((1, len(code.outputs), self.t.size))
+        assert code.observe_into is not None
         with np.errstate(all="ignore"):
-            observe((self.q.T, self.q_dot.T, self.q_ddot.T), self.t, p.T, found)
+            code.observe_into((self.q.T, self.q_dot.T, self.q_ddot.T), self.t, p.T, found)
         return np.asarray(found[0])
 
     def _names(self) -> tuple[tuple[str, ...], dict[str, str]]:
         """Return names and units of the multipliers and forces."""
         own = tuple(multiplier(name) for name in self.code.equations)
-        module = self.modules.compiled(True)
-        if module is not None:
-            names = module.OUTPUTS[module.OUTPUTS.index(own[0]) :]
-            return names, {name: module.UNITS[name] for name in names}
-        module = self.modules.compiled(False)
-        assert module is not None
-        names = (*own, *module.OUTPUTS)
-        return names, dict.fromkeys(own, "") | {name: module.UNITS[name] for name in module.OUTPUTS}
+        if (planned := self.code.request(FORCES, True)) is not None:
+            names = planned.outputs[planned.outputs.index(own[0]) :]
+            return names, {name: planned.units[name] for name in names}
+        code = self.code.request(FORCES, False)
+        assert code is not None
+        names = (*own, *code.outputs)
+        return names, dict.fromkeys(own, "") | {name: code.units[name] for name in code.outputs}
 
     def by_matrices(self) -> tuple[Array, NDArray[np.bool_]]:
         """Return values by singular values, and which of them redundant joints share."""
-        module = self.modules.compiled(False)
-        assert module is not None
-        states = self.q, self.q_dot, self.q_ddot
-        own = self.code.module
-        matrix = self.code.Phi_q(self.q, self.t, self.p)
+        own, given = self.code, self.code.request(FORCES, False)
+        assert given is not None
+        matrix = own.Phi_q(self.q, self.t, self.p)
         powers = powers_of_rows(matrix)
         matrix = powers[:, :, np.newaxis] * matrix
         inertia = np.einsum("lij,lj->li", own.M(self.q, self.t, self.p), self.q_ddot)
-        loads = own.Q(*states[:2], self.t, self.p)
+        loads = own.Q(self.q, self.q_dot, self.t, self.p)
         sides = loads - inertia
         left, values, right = np.linalg.svd(matrix, full_matrices=True)
         zero = values <= RANK * values[:, :1]
@@ -443,8 +435,8 @@ class _Points:
         idle = np.concatenate((zero, np.ones((len(zero), len(left[0]) - size), dtype=bool)), axis=1)
         mixed = np.where(idle, probe_of(idle.shape[1]), 0.0)
         loose = powers * np.einsum("lij,lj->li", left, mixed)
-        moved = np.abs(self._given(module, loose) - self._given(module, 0 * loose))
-        found = self._given(module, powers * factors)
+        moved = np.abs(self._given(given, loose) - self._given(given, 0 * loose))
+        found = self._given(given, powers * factors)
         is_shared = moved > HALF * np.abs(loose).max(axis=-1, keepdims=True, initial=0.0)
         rest = np.abs(np.einsum("lij,li->lj", matrix, factors) - sides).max(axis=-1)
         off = rest > BALANCED * (np.abs(loads) + np.abs(inertia)).max(axis=-1, initial=TINY)
@@ -452,8 +444,8 @@ class _Points:
         found[off] = np.nan
         return found, np.asarray(is_shared[~off].any(axis=0))
 
-    def _given(self, module: ModuleType, factors: Array) -> Array:
+    def _given(self, code: Compiled, factors: Array) -> Array:
         """Return multipliers and the forces that they give, shape (L, m + K)."""
         p = np.broadcast_to(self.p, (self.t.size, self.p.shape[-1]))
         both = np.concatenate((p, factors), axis=-1)
-        return np.concatenate((factors, self.outputs_of(module, both).T), axis=-1)
+        return np.concatenate((factors, self.outputs_of(code, both).T), axis=-1)

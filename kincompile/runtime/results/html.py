@@ -13,11 +13,11 @@ from kincompile.html import table_html
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from types import ModuleType
 
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from kincompile.runtime.engine.code import Compiled
     from kincompile.runtime.results.columns import MotionTable
 
 MOST_ROWS = 30
@@ -27,18 +27,18 @@ RESOLUTION = 100
 """Of images [dots per inch]."""
 
 
-def module_html(module: ModuleType) -> str:
+def module_html(code: Compiled) -> str:
     """Return an emitted module's sizes and coordinates as HTML."""
     header = ("column", "coordinate", "unit", "guess")
     rows: list[tuple[str, ...]] = [
-        (str(k), name, module.UNITS.get(name, ""), f"{guess:g}")
-        for k, (name, guess) in enumerate(zip(module.COORDINATES, module.GUESS, strict=True))
+        (str(k), name, code.units.get(name, ""), f"{guess:g}")
+        for k, (name, guess) in enumerate(zip(code.coordinates, code.guess, strict=True))
     ]
     title = (
-        f"emitted module, {module.N_COORDINATES} coordinates, {module.N_EQUATIONS} equations, "
-        f"{len(module.PATTERN)} entries of Phi_q, {len(module.PARAMETERS)} parameters"
+        f"emitted module, {len(code.coordinates)} coordinates, {len(code.equations)} equations, "
+        f"{len(code.pattern)} entries of Phi_q, {len(code.parameters)} parameters"
     )
-    return _first_rows(module.NAME, title, header, rows)
+    return _first_rows(code.name, title, header, rows)
 
 
 def solution_html(solution: MotionTable) -> str:

@@ -30,9 +30,8 @@ from kincompile.tables import table
 
 if TYPE_CHECKING:
     from collections.abc import Container, Sequence
-    from types import ModuleType
 
-    from kincompile.runtime.engine.code import Array
+    from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.results.between import Between
     from kincompile.runtime.results.columns import MotionTable
 
@@ -132,31 +131,31 @@ class Measures:
         return "\n\n".join("\n".join(part) for part in parts if part)
 
 
-def measures(solution: MotionTable, module: ModuleType, p: Array) -> Measures:
-    """Measure the motion of a module with parameters p, as `Solution.measures` describes."""
-    found = output_measures(solution, module, p)
-    return Measures(solution.name, found, driver_ranges(solution, module, p))
+def measures(solution: MotionTable, code: Compiled, p: Array) -> Measures:
+    """Measure the motion of a mechanism with parameters p, as `Solution.measures` describes."""
+    found = output_measures(solution, code, p)
+    return Measures(solution.name, found, driver_ranges(solution, code, p))
 
 
 def output_measures(
-    solution: MotionTable, module: ModuleType, p: Array, names: Container[str] | None = None
+    solution: MotionTable, code: Compiled, p: Array, names: Container[str] | None = None
 ) -> tuple[OutputMeasures, ...]:
-    """Measure the outputs of these names, or all, over the motion of a module."""
+    """Measure the outputs of these names, or all, over the motion of a mechanism."""
     solution.require_one_motion("measures are those of", "solve with one of the parameter sets")
     if not np.isfinite(solution.q_dot).any():
         raise InputError(f"{solution.name} has no motion to measure. {solution.message}")
     if all(name in solution.observed.without_rates for name in solution.observed.names):
         return ()
-    motion = ObservedMotion(solution, module, p)
+    motion = ObservedMotion(solution, code, p)
     return alone(motion, _all_measured(motion, names))
 
 
 def measures_together(
-    solutions: Sequence[MotionTable], module: ModuleType, sets: Array, names: Container[str]
+    solutions: Sequence[MotionTable], code: Compiled, sets: Array, names: Container[str]
 ) -> list[tuple[OutputMeasures, ...]]:
     """Measure the outputs of these names over motions with parameters (B, k), as each alone."""
     pairs = zip(solutions, sets, strict=True)
-    motions = [ObservedMotion(one, module, p) for one, p in pairs]
+    motions = [ObservedMotion(one, code, p) for one, p in pairs]
     return together(motions, [_all_measured(motion, names) for motion in motions])
 
 

@@ -8,29 +8,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import probe_of
-from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.columns import Observed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import ModuleType
 
     from numpy.typing import NDArray
 
-    Array = NDArray[np.float64]
+    from kincompile.runtime.engine.code import Array, Compiled
 
 
-def observed(module: ModuleType, motion: tuple[Array, Array, Array], t: Array, p: Any) -> Observed:
-    """Evaluate the outputs of a module over a motion (..., N, n) with parameters p (..., k)."""
-    names = getattr(module, "OUTPUTS", ())
-    units = {name: module.UNITS[name] for name in names}
+def observed(code: Compiled, motion: tuple[Array, Array, Array], t: Array, p: Any) -> Observed:
+    """Evaluate the outputs of a mechanism over a motion (..., N, n) with parameters p (..., k)."""
+    names = code.outputs
+    units = {name: code.units[name] for name in names}
     sets = np.asarray(p, dtype=np.float64)
     if sets.ndim > 1:
         sets = sets[:, np.newaxis]
     # Where second rates were found, so were position and velocity; nearly always that is all.
     if names and math.isfinite(float(motion[2].sum())):
-        y, y_dot, y_ddot = _everywhere(module, motion, t, sets)
+        y, y_dot, y_ddot = _everywhere(code, motion, t, sets)
         return Observed(names, units, y, y_dot, y_ddot)
     results = np.full((3, *motion[0].shape[:-1], len(names)), np.nan)
     if names:
@@ -39,7 +37,7 @@ def observed(module: ModuleType, motion: tuple[Array, Array, Array], t: Array, p
 
         def observe(at: NDArray[np.bool_], q_ddot: Array) -> NDArray[Any]:
             times, own = np.broadcast_to(t, at.shape)[at], sets[at] if sets.ndim > 1 else sets
-            return np.array(module.observe(motion[0][at], motion[1][at], q_ddot, times, own))
+            return np.array(code.observe(motion[0][at], motion[1][at], q_ddot, times, own))
 
         position, complete = (
             np.isfinite(sum(part.sum(axis=-1) for part in parts)) for parts in (motion[:2], motion)
@@ -55,13 +53,13 @@ def observed(module: ModuleType, motion: tuple[Array, Array, Array], t: Array, p
     return Observed(names, units, *results)
 
 
-def _everywhere(module: ModuleType, motion: Sequence[Array], t: Array, p: Array) -> Sequence[Array]:
+def _everywhere(code: Compiled, motion: Sequence[Array], t: Array, p: Array) -> Sequence[Array]:
     """Return the outputs, their rates and second rates of a motion that was found throughout."""
-    observe = code_of(module).observe_into
+    observe = code.observe_into
     if observe is None or motion[0].ndim != 2 or p.ndim != 1:
-        found: Sequence[Array] = module.observe(*motion, t, p)
+        found: Sequence[Array] = code.observe(*motion, t, p)
         return found
-    seen = empty((3, len(module.OUTPUTS), t.size))
+    seen = empty((3, len(code.outputs), t.size))
     with np.errstate(all="ignore"):
         observe([part.T for part in motion], t, p, seen)
     return [part.T for part in seen]

@@ -28,7 +28,7 @@ from kincompile.names import (
     rate_of,
     suggestion,
 )
-from kincompile.runtime.engine.code import SENSITIVITIES, code_of, on_request
+from kincompile.runtime.engine.code import SENSITIVE, SENSITIVITIES, code_of
 from kincompile.runtime.engine.dense import powers_of_rows
 from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.inputs import names_of
@@ -40,11 +40,10 @@ from kincompile.tables import indented, table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from types import ModuleType
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.code import Array, Code, SensitiveModules
+    from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.results.solution import Solution
 
     Coupling = Sequence[tuple[int, int, Array]]
@@ -230,8 +229,7 @@ def sensitivities(
     if problem := parameters_problem(names, tuple(solution.parameters), solution.name):
         raise InputError(problem)
     code = code_of(solution.require_module("its sensitivities"))
-    outputs = getattr(code.module, "OUTPUTS", ())
-    columns = (*code.coordinates, *outputs)
+    columns = (*code.coordinates, *code.outputs)
     if of is not None:
         columns = _columns(names_of(of, "of"), columns, solution.name)
     found = _over_motion(solution, code, names, columns, second)
@@ -276,17 +274,9 @@ def _columns(of: Sequence[str], known: Sequence[str], mechanism: str) -> tuple[s
     return tuple(name for name in known if name in wanted)
 
 
-def _modules(module: ModuleType) -> SensitiveModules:
-    """Return what compiles a mechanism's sensitivities."""
-    grouped = "and that has no sensitivities: differentiate a part of it, or"
-    then = "solve with that, then ask for sensitivities"
-    found: SensitiveModules = on_request(module, SENSITIVITIES, grouped, then)
-    return found
-
-
 def _over_motion(
     solution: Solution,
-    code: Code,
+    code: Compiled,
     names: tuple[str, ...],
     columns: tuple[str, ...],
     second: bool,
@@ -300,8 +290,7 @@ def _over_motion(
     times = np.broadcast_to(solution.t, shape).ravel()
     p = np.array(list(solution.parameters.values()), dtype=np.float64)
     sets = p if p.ndim == 1 else np.repeat(p, shape[-1], axis=1)
-    modules = _modules(code.module)
-    points = _Points(code, modules, names, columns, second, sets, times, *motion)
+    points = _Points(code, names, columns, second, sets, times, *motion)
     finite = np.isfinite(motion[1].sum(axis=0))
     if code.redundant and finite.any():
         some = np.flatnonzero(finite)
@@ -346,8 +335,7 @@ def _are_met(matrix: Array, rates: Array, sides: Array, part: float) -> NDArray[
 class _Points:
     """A batch of points, and what is asked there: columns by parameters."""
 
-    code: Code
-    modules: SensitiveModules
+    code: Compiled
     names: tuple[str, ...]
     columns: tuple[str, ...]
     second: bool
@@ -365,16 +353,15 @@ class _Points:
 
     def by_plan(self) -> tuple[Array, NDArray[np.bool_]]:
         """Return the derivatives by the planned elimination, and where that can be trusted."""
-        module = self.modules.observing(self.names, self.columns, self.second)
+        code = self.code.request(SENSITIVITIES, self.names, self.columns, self.second)
         k = len(self.names)
         size = k + self.second * k * (k + 1) // 2, len(self.columns)
-        if module is None:
+        if code is None:
             return np.empty((3, *size, self.t.size)), np.zeros(self.t.size, dtype=bool)
-        code = code_of(module)
-        seen = empty((3, len(module.OUTPUTS), self.t.size))
+        seen = empty((3, len(code.outputs), self.t.size))
         assert code.observe_into is not None
         code.observe_into((self.q, self.q_dot, self.q_ddot), self.t, self.p, seen)
-        blocks = len(module.OUTPUTS) - math.prod(size)
+        blocks = len(code.outputs) - math.prod(size)
         found: Array = seen[:, blocks:].reshape(3, *size, -1)
         return found, trusted(seen[0, 0], seen[0, 1:blocks])
 
@@ -382,12 +369,12 @@ class _Points:
         """Return Phi_q, (L, m, n), and -Phi_a of each parameter, (L, k, m)."""
         m, k, q = len(self.code.equations), len(self.names), self.q.T
         held = np.concatenate((q, np.zeros((len(q), k * q.shape[1]))), axis=1)
-        sides = -self.modules.larger(self.names).Phi(held, self.t, self.p.T)[:, m:]
+        sides = -self.code.request(SENSITIVE, self.names).position(held, self.t, self.p.T)[0][:, m:]
         return self.code.Phi_q(q, self.t, self.p.T), sides.reshape(-1, k, m)
 
     def by_matrices(self) -> Array:
         """Return the derivatives by singular values; of redundant equations by least squares."""
-        larger = self.modules.larger(self.names)
+        larger = self.code.request(SENSITIVE, self.names)
         m, n, k = len(self.code.equations), len(self.code.coordinates), len(self.names)
         q, q_dot, q_ddot, t, p = self.q.T, self.q_dot.T, self.q_ddot.T, self.t, self.p.T
         matrices, first = self.slopes()
@@ -409,22 +396,21 @@ class _Points:
         gamma = _reduced(larger.gamma(every_q, every_q_dot, t, p), coupling, q_ddot)
         every = every_q, every_q_dot, np.concatenate((q_ddot, solved(gamma[:, m:])), axis=1)
         found = np.array(every)[..., n:].reshape(3, -1, k, n)
-        if outputs := getattr(self.code.module, "OUTPUTS", ()):
+        if outputs := self.code.outputs:
             seen = observed(larger, every, t, p)
             y = np.array((seen.y, seen.y_dot, seen.y_ddot))[..., len(outputs) :]
             found = np.concatenate((found, y.reshape(3, -1, k, len(outputs))), axis=-1)
-        known = (*self.code.coordinates, *outputs)
-        places = [known.index(name) for name in self.columns]
+        places = [(*self.code.coordinates, *outputs).index(name) for name in self.columns]
         by_point: Array = np.moveaxis(found[..., places], 1, -1)
         return by_point
 
 
-def _coupling(larger: ModuleType, q: Array, t: Array, p: Array, m: int, n: int) -> Coupling:
+def _coupling(larger: Compiled, q: Array, t: Array, p: Array, m: int, n: int) -> Coupling:
     """Return row, column and values of the entries left of the diagonal blocks."""
-    entries = larger.Phi_q_nonzeros(q, t, p)
+    entries = larger.nonzeros(q, t, p)
     return [
         (row, column, entries[:, number])
-        for number, (row, column) in enumerate(larger.PATTERN.tolist())
+        for number, (row, column) in enumerate(larger.pattern.tolist())
         if row >= m and column < n
     ]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.html import picture_html
-from kincompile.runtime.engine.code import JOINT_POINTS
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.results.columns import MotionTable, Observed
 from kincompile.runtime.results.html import solution_html
 from kincompile.runtime.results.measures import measures
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from kincompile.runtime.engine.code import Compiled
     from kincompile.runtime.results.measures import Measures
 
 
@@ -87,7 +88,8 @@ class Solution(MotionTable):
     def observed(self) -> Observed:
         """The outputs and their rates; evaluated on first access."""
         if "outputs" not in self._observed:
-            self._observed["outputs"] = self._over_motion(self.require_module("its outputs"))
+            code = code_of(self.require_module("its outputs"))
+            self._observed["outputs"] = self._over_motion(code)
         return self._observed["outputs"]
 
     @property
@@ -96,18 +98,16 @@ class Solution(MotionTable):
 
         In space the angular velocities of bodies too, ``omega_x_<body>`` to ``omega_zeta_<body>``.
         """
-        if JOINT_POINTS not in self._observed:
-            module = self.require_module("its joints")
-            compiled = vars(module).get(JOINT_POINTS)
-            own = module if compiled is None else compiled()
-            self._observed[JOINT_POINTS] = self._over_motion(own)
-        return self._observed[JOINT_POINTS]
+        if "joints" not in self._observed:
+            code = code_of(self.require_module("its joints"))
+            self._observed["joints"] = self._over_motion(code.points())
+        return self._observed["joints"]
 
-    def _over_motion(self, module: ModuleType) -> Observed:
+    def _over_motion(self, code: Compiled) -> Observed:
         p = np.array(list(self.parameters.values()), dtype=np.float64).T
         if self.q.ndim > 2 and not p.size:
             p = np.zeros((len(self.q), 0))
-        return observed(module, (self.q, self.q_dot, self.q_ddot), self.t, p)
+        return observed(code, (self.q, self.q_dot, self.q_ddot), self.t, p)
 
     def observing(self, outputs: Observed) -> Solution:
         """Return the same motion with other outputs."""
@@ -162,14 +162,14 @@ class Solution(MotionTable):
         return replace(one, success=bool(one.good.all()))
 
     def _at_points(self, function: Callable[..., NDArray[Any]]) -> NDArray[Any]:
-        """Return a function of module, q, t and p for the motion, or for that of each variant."""
-        module = self.require_module(".condition and .branch")
+        """Return a function of code, q, t and p for the motion, or for that of each variant."""
+        code = code_of(self.require_module(".condition and .branch"))
         p = np.array(list(self.parameters.values()), dtype=np.float64)
         if self.q.ndim == 2:
-            return function(module, self.q, self.t, p)
+            return function(code, self.q, self.t, p)
         sets = p.T if p.size else np.zeros((len(self.q), 0))
         variants = zip(self.q, sets, strict=True)
-        return np.array([function(module, q, self.t, one) for q, one in variants])
+        return np.array([function(code, q, self.t, one) for q, one in variants])
 
     def __getstate__(self) -> list[Any]:
         """Return everything but the module, which cannot be pickled; outputs are evaluated now."""
@@ -200,7 +200,7 @@ class Solution(MotionTable):
             If the solution is one of variants, holds no point that was found, or was pickled.
         """
         p = np.array(list(self.parameters.values()), dtype=np.float64)
-        return measures(self, self.require_module("its measures"), p)
+        return measures(self, code_of(self.require_module("its measures")), p)
 
     def plot(
         self,

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.runtime.engine.code import Array, Code, code_of
 from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.engine.sparse import Sparse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from types import ModuleType
 
     from numpy.typing import NDArray
+
+    from kincompile.runtime.engine.code import Array, Compiled
 
     Signs = NDArray[np.int8]
 
@@ -28,21 +28,21 @@ BLOCK = 2048
 """Points at a time, so that intermediate arrays stay in the cache."""
 
 
-def signatures(module: ModuleType, q: Array, t: Array, p: Sequence[float]) -> Signs:
+def signatures(code: Compiled, q: Array, t: Array, p: Sequence[float]) -> Signs:
     """Return the signature of each point of a motion, shape (N, blocks), for q (N, n) at t (N,).
 
     It is 0 where q is NaN.
     """
     known = np.flatnonzero(np.isfinite(q).all(axis=1))
     with np.errstate(all="ignore"):
-        parts = list(_signs(code_of(module), q[known], t[known], np.asarray(p, dtype=np.float64)))
+        parts = list(_signs(code, q[known], t[known], np.asarray(p, dtype=np.float64)))
     found = np.nan_to_num(np.concatenate(parts)) if parts else np.zeros((0, 1))
     result = np.zeros((t.size, found.shape[1]), dtype=np.int8)
     result[known] = found
     return result
 
 
-def _signs(code: Code, q: Array, t: Array, p: Array) -> Iterator[Array]:
+def _signs(code: Compiled, q: Array, t: Array, p: Array) -> Iterator[Array]:
     """Yield the signs of known positions, some at a time."""
     if code.lanes is None:
         engine = Sparse(code, p) if code.blocks else Dense(code, p)

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import measured
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
-    from kincompile.runtime.engine.linear import Array as Vector
+    from kincompile.runtime.engine.code import Array as Vector
+    from kincompile.runtime.engine.code import Compiled
 
 BLOCK = 512
 """Points at a time, so that memory is bounded."""
@@ -21,7 +20,7 @@ LARGEST_DENSE = 300
 but where equations are redundant."""
 
 
-def conditions(module: ModuleType, q: Vector, t: Vector, p: Vector) -> Vector:
+def conditions(code: Compiled, q: Vector, t: Vector, p: Vector) -> Vector:
     """Return the condition number of the scaled Phi_q at every point of a motion, shape (N,).
 
     Lengths count in sizes of the mechanism, angles in radians, and each equation in what its terms
@@ -30,20 +29,20 @@ def conditions(module: ModuleType, q: Vector, t: Vector, p: Vector) -> Vector:
     """
     result = np.full(t.size, np.nan)
     found = np.flatnonzero(np.isfinite(q).all(axis=1))
-    if not (found.size and module.N_EQUATIONS):
+    if not (found.size and code.equations):
         return result
     with np.errstate(all="ignore"):
         first = found[0]
-        equations = problem(module, p, np.ascontiguousarray(q[first]), float(t[first]))
+        equations = measured(code, p, np.ascontiguousarray(q[first]), float(t[first]))
         columns = equations.reference
         rows = equations.weights()
         for start in range(0, found.size, BLOCK):
             part = found[start : start + BLOCK]
             if columns.size <= LARGEST_DENSE or rows.size > columns.size:
-                matrices = module.Phi_q(np.ascontiguousarray(q[part]), t[part], p)
+                matrices = code.Phi_q(np.ascontiguousarray(q[part]), t[part], p)
                 result[part] = _of_dense(rows[:, np.newaxis] * matrices * columns)
             else:
-                result[part] = [_estimate(module, q[k], t[k], p, rows, columns) for k in part]
+                result[part] = [_estimate(code, q[k], t[k], p, rows, columns) for k in part]
     return result
 
 
@@ -54,15 +53,15 @@ def _of_dense(matrices: Vector) -> Vector:
 
 
 def _estimate(
-    module: ModuleType, q: Vector, t: float, p: Vector, rows: Vector, columns: Vector
+    code: Compiled, q: Vector, t: float, p: Vector, rows: Vector, columns: Vector
 ) -> float:
     """Return an estimate in the 1-norm (Higham and Tisseur) from a sparse factorization."""
     # Importing SciPy's sparse matrices takes longer than the whole runtime.
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
-    i, j = module.PATTERN.T
-    values = rows[i] * module.Phi_q_nonzeros(np.ascontiguousarray(q), t, p) * columns[j]
+    i, j = code.pattern.T
+    values = rows[i] * code.nonzeros(np.ascontiguousarray(q), t, p) * columns[j]
     matrix = csc_array((values, (i, j)), shape=(rows.size, columns.size))
     try:
         factored: Any = splu(matrix)

@@ -23,7 +23,7 @@ from kincompile.runtime.singular.curve import Bracket, Curve
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from kincompile.runtime.engine.code import Code
+    from kincompile.runtime.engine.code import Compiled
     from kincompile.runtime.engine.linear import Array as Vector
     from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.problem import Problem
@@ -184,7 +184,7 @@ def status_after(event: Event, outcome: Outcome, t: float) -> Status:
     return Status.LOCK_UP if event.kind == LOCK_UP and not is_there else Status.SINGULAR
 
 
-def branch_switch(code: Code, state: State, t: float, q: Vector, reference: Vector) -> Event:
+def branch_switch(code: Compiled, state: State, t: float, q: Vector, reference: Vector) -> Event:
     """Return the event of a position q at t that a mechanism could only jump to from a state."""
     jump = (q - state.point.q) / reference
     bodies = involved(code, jump)
@@ -208,7 +208,7 @@ def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) ->
     )  # fmt: skip
 
 
-def involved(code: Code, movement: Vector) -> tuple[str, ...]:
+def involved(code: Compiled, movement: Vector) -> tuple[str, ...]:
     """Return the bodies that take part in a movement, and coordinates that belong to none."""
     large = np.abs(movement) > INVOLVED * np.max(np.abs(movement), initial=0.0)
     owners = code.owners()

@@ -17,7 +17,7 @@ from kincompile.criteria import RANK, TINY, ZERO
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.corrector import nearest
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import measured
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -58,8 +58,7 @@ class Balance:
 
     def __init__(self, inputs: Inputs) -> None:
         self.code, self._p = inputs.code, inputs.p
-        self.module = inputs.code.module
-        self.equations: Problem = problem(self.module, inputs.p, inputs.guess, float(inputs.t[0]))
+        self.equations: Problem = measured(self.code, inputs.p, inputs.guess, float(inputs.t[0]))
 
     @property
     def scale(self) -> Array:
@@ -84,11 +83,11 @@ class Balance:
 
     def loads(self, q: Array, t: complex) -> Array:
         """Return Q of the mechanism at rest."""
-        return np.asarray(self.module.Q(q, np.zeros_like(q), t, self._p))
+        return np.asarray(self.code.Q(q, np.zeros_like(q), t, self._p))
 
     def slopes(self, q: Array, t: float) -> Array:
         """Return Q_q of the mechanism at rest."""
-        return np.asarray(self.module.Q_q(q, np.zeros_like(q), t, self._p))
+        return np.asarray(self.code.Q_q(q, np.zeros_like(q), t, self._p))
 
     def acting(self, place: Place) -> Array:
         """Return the size of all that acts on each coordinate, shape (n,)."""
@@ -99,7 +98,7 @@ class Balance:
     def turning(self, q: Array, factors: Array, t: float, directions: Array) -> Array:
         r"""Return the changes of :math:`\Phi_q^T \lambda - Q` along directions (n, k)."""
         loads = self.slopes(q, t) @ directions
-        moved = np.asarray(self.code.module.Phi_q(q + 1j * STEP * directions.T, t, self._p))
+        moved = np.asarray(self.code.Phi_q(q + 1j * STEP * directions.T, t, self._p))
         joints = np.einsum("kmn,m->nk", moved.imag, factors) / STEP
         return np.asarray(joints - loads)
 
@@ -116,11 +115,11 @@ class Balance:
         how the mechanism moves.
         """
         q, t, free = place.q, place.point.t, place.free
-        inertia = free.T @ self.module.M(q, t, self._p) @ free
+        inertia = free.T @ self.code.M(q, t, self._p) @ free
         values = np.linalg.eigvalsh(inertia)
         if not values.min(initial=np.inf) > RANK * values.max(initial=0.0):
             return None
-        slopes = free.T @ self.module.Q_q_dot(q, np.zeros_like(q), t, self._p) @ free
+        slopes = free.T @ self.code.Q_q_dot(q, np.zeros_like(q), t, self._p) @ free
         both = np.linalg.solve(inertia, np.hstack((-stiffness, slopes)))
         size = len(both)
         s = np.linalg.eigvals(np.vstack((np.eye(size, 2 * size, size), both)))
@@ -133,19 +132,17 @@ class Balance:
     def in_time(self, q: Array, factors: Array, t: float) -> tuple[Array, Array]:
         r"""Return how :math:`\Phi_q^T \lambda - Q` and Phi change in time where nothing moves."""
         later = t + 1j * STEP
-        moved = np.asarray(self.code.module.Phi_q(q, later, self._p))
+        moved = np.asarray(self.code.Phi_q(q, later, self._p))
         load = np.asarray(self.loads(q, later))
         forces = (moved.imag.T @ factors - load.imag) / STEP
         return forces, -np.asarray(self.code.nu(q, t, self._p))
 
     def gradients(self, names: Sequence[str], q: Array, t: float) -> Array:
         """Return the derivatives of coordinates or outputs of these names, shape (k, n)."""
-        outputs = getattr(self.module, "OUTPUTS", ())
-        known = (*self.code.coordinates, *outputs)
-        rows = np.eye(q.size)
-        if outputs:
+        known, rows = (*self.code.coordinates, *self.code.outputs), np.eye(q.size)
+        if self.code.outputs:
             still = np.zeros_like(q)
-            rows = np.vstack((rows, self.module.outputs_q(q, still, still, t, self._p)))
+            rows = np.vstack((rows, self.code.outputs_q(q, still, still, t, self._p)))
         wanted = [column_name(name) for name in names]
         if missing := [name for name in wanted if name not in known]:
             near = suggestion(missing[0], known) or "."

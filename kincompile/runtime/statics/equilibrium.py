@@ -347,9 +347,9 @@ def _inputs(
     inputs = read_inputs(module, t, p, guess, TOLERANCE, MAX_ITERATIONS, may_move=True)
     if through not in (None, "snap"):
         raise InputError(f"through is {through!r}: give 'snap', or nothing.")
-    if not hasattr(module, "LOADS"):
+    if not inputs.code.has_loads:
         raise InputError(
-            f"{module.NAME} has no masses and no forces, so that every position is one of "
+            f"{inputs.code.name} has no masses and no forces, so that every position is one of "
             "equilibrium: give its bodies masses and m.gravity, or add loads such as kc.Spring."
         )
     return inputs

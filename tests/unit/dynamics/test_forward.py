@@ -7,10 +7,7 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 import kincompile as kc
-from kincompile.compiler import _dynamic_modules  # the compiled equations of motion themselves
-from kincompile.ir.inline import inline
-from kincompile.ir.lower import lower
-from kincompile.runtime.dynamics.equations import Equations
+from kincompile.runtime.dynamics.equations import Equations, dynamics_of
 from kincompile.runtime.inputs import read_inputs
 from tests.unit.dynamics.heavy import heavy_examples
 
@@ -148,9 +145,8 @@ def test_that_every_example_accelerates_as_its_equations_say(name, target, quick
 def equations_of(model, target="numpy"):
     """Return the equations of motion of a model as they are compiled, and its module."""
     module = kc.compile(model, target=target)
-    modules = _dynamic_modules(inline(lower(model.system())), model.system(), target)
     inputs = read_inputs(module, [0.0], None, None, 1e-10, 50, may_move=True)
-    return Equations(inputs, modules), module
+    return Equations(inputs, dynamics_of(inputs.code)), module
 
 
 def test_that_a_state_goes_back_to_its_constraints_by_the_way_the_masses_measure():

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import kincompile as kc
 from kincompile import spatial
-from kincompile.runtime.dynamics.equations import Equations, dynamic_modules
+from kincompile.runtime.dynamics.equations import Equations, dynamics_of
 from kincompile.runtime.dynamics.happenings import SINGULAR, Watch
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.singular.events import LOCK_UP
@@ -235,7 +235,7 @@ def test_that_only_what_is_driven_locks_up(motor):
         m.add(kc.AbsoluteX("motor", "rod0", (0, 0), 1.5 - motor * kc.t))
     module, angle = kc.compile(m), 1e-4
     inputs = read_inputs(module, [0.0, 1.0], None, None, 1e-10, 50, may_move=True)
-    equations = Equations(inputs, dynamic_modules(module))
+    equations = Equations(inputs, dynamics_of(inputs.code))
     q = np.zeros(module.N_COORDINATES)
     for body, first, _ in module.BODIES:
         k, is_crank = int(body[-1]), body.startswith("crank")

@@ -6,7 +6,8 @@ import sympy
 from scipy.integrate import solve_ivp  # type: ignore[attr-defined]  # a star there
 
 import kincompile as kc
-from kincompile.runtime.dynamics.equations import dynamic_modules
+from kincompile.runtime.dynamics.equations import dynamics_of
+from kincompile.runtime.engine.code import code_of
 from tests.targets.test_forward_dynamics import mixed, repeated, rolling
 from tests.unit.dynamics.test_forward import equations_of
 
@@ -41,7 +42,7 @@ def test_that_the_jacobian_is_that_of_complex_steps(model):
     n, rng = module.N_COORDINATES, np.random.default_rng(1)
     y = np.concatenate((module.GUESS, np.zeros(n + 1)))
     y[:-1] += rng.uniform(-0.3, 0.3, 2 * n)
-    accelerations = dynamic_modules(kc.compile(model)).accelerations
+    accelerations = dynamics_of(code_of(kc.compile(model))).accelerations
     steps = y[:-1] + 1e-30j * np.eye(2 * n)
     q, q_dot, t = steps[:, :n], steps[:, n:], np.full(2 * n, 0.4)
     found = accelerations.observe(q, q_dot, 0 * q, t)[0].imag / 1e-30

@@ -1,6 +1,7 @@
 """The engines: each solves the systems that NumPy solves, and says no less."""
 
 from dataclasses import replace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -8,12 +9,13 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.engine.code import POINTS, SENSITIVE, code_of
 from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.engine.linear import Linear
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.engine.scales import Point
 from kincompile.runtime.engine.sparse import Sparse
+from kincompile.runtime.load import from_source
 from kincompile.runtime.problem import problem
 
 ENGINES: dict[str, Any] = {"dense": Dense, "planned": Planned, "sparse": Sparse}
@@ -128,3 +130,22 @@ def test_that_a_module_is_read_once_and_again_when_it_is_compiled(example_named,
     assert native.march_variants is not None
     assert code_of(module).march is None
     assert native.lanes is not None
+
+
+def test_that_what_is_asked_for_again_is_not_compiled_again(example_named):
+    example = example_named("four_bar")
+    code = code_of(example.module)
+    assert code.points() is code.request(POINTS) is code.points()
+    assert code.request(SENSITIVE, ("a",)) is code.request(SENSITIVE, ("a",))
+    of_file = code_of(from_source(kc.emit(example.model).source, "four_bar"))
+    assert of_file.points() is of_file
+    with pytest.raises(kc.InputError, match=r"loaded from a file.*compile the model, solve with"):
+        of_file.request(SENSITIVE, ("a",))
+
+
+def test_that_a_copy_of_a_module_is_read_for_itself(example_named):
+    module = example_named("four_bar").module
+    copy = ModuleType("copy")
+    vars(copy).update(vars(module), nu=lambda q, t, p: np.zeros_like(q))
+    assert code_of(copy).nu is copy.nu
+    assert code_of(module).nu is module.nu
