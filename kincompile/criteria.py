@@ -258,7 +258,7 @@ BESIDE = (0.0, -1e-8, 1e-8, -1e-6, 1e-6, -1e-5)
 """Distances from a lock-up at which a place is looked for: its time is off by their square."""
 
 ROOT_STEPS = 80
-"""Steps of the search in that piece; as many halvings as there are bits."""
+"""Looks after which a search for a zero is over; as many halvings as there are bits."""
 
 # Events
 

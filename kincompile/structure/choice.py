@@ -74,7 +74,7 @@ def _along_motion(evaluate: Evaluate, ranks: RankReport, end: float) -> Array:
     before, q = ranks.nearest, ranks.nearest
     for t in np.linspace(0, end, TIMES):
         at = 2 * q - before
-        for _ in range(ITERATIONS):
+        for _ in range(ITERATIONS):  # few digits do; `rank`'s steps, to all, double a build
             Phi, Phi_q = (x[0] for x in evaluate(at[np.newaxis], np.array([t])))
             matrix = Phi_q * ranks.scale
             lengths = np.linalg.norm(matrix, axis=1)

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import IN_RANGE, ROOT_LENGTH, SINGULAR_SENSITIVITY, TINY
+from kincompile.criteria import IN_RANGE, ROOT_LENGTH, SINGULAR_SENSITIVITY
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.inputs import mapping_of
+from kincompile.runtime.roots import root
 from kincompile.runtime.singular import events as singular
 from kincompile.runtime.singular.events import LOCK_UP, Event, involved
 
@@ -160,7 +161,8 @@ class Watch:
         return np.asarray([known[name] for name in self._names] - self._values)
 
     def _located(self, k: int, t0: float, t1: float, state: States) -> Event:
-        t = root(lambda time: float(self._away(time, state(time))[k]), t0, t1)
+        width = ROOT_LENGTH * max(abs(t1 - t0), abs(t0), abs(t1))
+        t = root(lambda time: float(self._away(time, state(time))[k]), t0, t1, width)
         q = state(t)[: self._equations.n]
         name = self._names[k]
         text = SENTENCES[self._kinds[k]].format(name=name, value=self._values[k], t=f"{t:.10g}")
@@ -177,12 +179,3 @@ class Watch:
         text = SENTENCES[kind].format(t=f"{t:.10g}", bodies=listed(bodies))
         shares = dict(zip(code.coordinates, share.tolist(), strict=True))
         return Event(kind, t, bodies, text, q.copy(), shares)
-
-
-def root(function: Callable[[float], float], t0: float, t1: float) -> float:
-    """Return where a function changes its sign within a step."""
-    from scipy.optimize import brentq
-
-    low, high = min(t0, t1), max(t0, t1)
-    width = ROOT_LENGTH * max(high - low, abs(low), abs(high))
-    return float(brentq(function, low, high, xtol=max(width, TINY), rtol=4 * np.finfo(float).eps))

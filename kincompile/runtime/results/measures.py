@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -26,6 +27,7 @@ from kincompile.runtime.results.between import ObservedMotion, alone, derivative
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.driver_range import DriverRange, driver_ranges, driver_table
 from kincompile.runtime.results.plot import runs
+from kincompile.runtime.roots import zero
 from kincompile.tables import table
 
 if TYPE_CHECKING:
@@ -37,9 +39,6 @@ if TYPE_CHECKING:
 
 SAME = 1e-7
 """Difference, relative to its stroke, up to which an output repeats itself."""
-
-ROOT_STEPS = 60
-"""Steps of the search for a zero: as many halvings as there are bits."""
 
 GAUSS_PLACES = 8
 """Places for the integral over a step at whose ends a rate does not exist."""
@@ -243,25 +242,14 @@ def _brackets(
 def _zero(motion: ObservedMotion, k: int, low: float, high: float) -> Between[tuple[float, float]]:
     """Return when the rate of an output is zero between two times, and the rate there.
 
-    Newton's method, or secants where no second rate is emitted, with a bisection where either
-    leaves the bracket. At a corner there is no zero: the sign changes there.
+    At a corner there is no zero: the sign changes there.
     """
-    smallest = ROOT_LENGTH * motion.span
-    _, at_low, _ = yield from motion.at(low, k)
-    before = low
-    rate_before, t = at_low, (low + high) / 2
-    for _ in range(ROOT_STEPS):
-        _, rate, slope = yield from motion.at(t, k)
-        if not math.isfinite(rate) or rate == 0:
-            break
-        if not math.isfinite(slope):
-            slope = (rate - rate_before) / (t - before)
-        low, high = (t, high) if rate * at_low > 0 else (low, t)
-        before, rate_before = t, rate
-        following = t - rate / slope if slope else low
-        if abs(following - t) <= smallest or high - low <= smallest:
-            break
-        t = following if low < following < high else (low + high) / 2
+    search = zero(low, high, ROOT_LENGTH * motion.span)
+    t, rate = next(search), math.nan
+    with suppress(StopIteration):
+        while True:
+            _, rate, slope = yield from motion.at(t, k)
+            t = search.send((rate, slope))
     return t, rate
 
 

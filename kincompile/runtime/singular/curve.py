@@ -24,7 +24,6 @@ from kincompile.criteria import (
     LONGEST_ARC,
     MAX_ARCS,
     ROOT_LENGTH,
-    ROOT_STEPS,
     SHORTEST_ARC,
     SLIGHT,
     SMALL_CORRECTION,
@@ -33,6 +32,7 @@ from kincompile.criteria import (
 )
 from kincompile.runtime.engine.dense import solve_linear
 from kincompile.runtime.engine.scales import weights_of
+from kincompile.runtime.roots import root
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -86,7 +86,7 @@ class Curve:
         y = np.append(place.q, place.t) + length * place.tangent * self.scale
         predicted = y.copy()
         last = math.inf
-        for _ in range(ARC_CORRECTIONS):
+        for _ in range(ARC_CORRECTIONS):  # in time too, whose rounding no equation's terms show
             found = self._derivatives(y[:-1], float(y[-1]))
             if found is None:
                 return None
@@ -133,7 +133,7 @@ class Curve:
         """Return the singular configuration in a bracket, and how far along it lies."""
         first = bracket.first
         if bracket.turns:
-            at = _root(lambda length: self._forward(first, length), bracket.length)
+            at = self._zero(bracket, lambda place: float(place.tangent[-1]))
             # Where several movements become free at once no step ends; beside it t is the same.
             for offset in BESIDE:
                 place = self.step(first, at + offset)
@@ -141,7 +141,7 @@ class Curve:
                     return place, at + offset
             return None
         blocks = self._changed(first, bracket.second)
-        at = _root(lambda length: self._least(first, length, blocks), bracket.length)
+        at = self._zero(bracket, lambda place: float(self._parts(first, place, blocks).min()))
         before = self.step(first, at - AROUND)
         parts = np.zeros(len(blocks)) if before is None else self._parts(first, before, blocks)
         return self._between(first, at, blocks[int(np.argmin(parts))])
@@ -168,15 +168,14 @@ class Curve:
         """Return the determinant of a block at a place."""
         return float(self.equations.engine.determinants(place.point, first.point)[block])
 
-    def _forward(self, place: CurvePoint, length: float) -> float | None:
-        """Return the tangent's component along time after a step of this length."""
-        found = self.step(place, length) if length else place
-        return None if found is None else float(found.tangent[-1])
+    def _zero(self, bracket: Bracket, value: Callable[[CurvePoint], float]) -> float:
+        """Return the length of the step from the first point at whose end a value is zero."""
 
-    def _least(self, place: CurvePoint, length: float, blocks: list[int]) -> float | None:
-        """Return the smallest ratio of block determinants after a step of this length."""
-        found = self.step(place, length) if length else place
-        return None if found is None else float(np.min(self._parts(place, found, blocks)))
+        def at(length: float) -> float:
+            place = self.step(bracket.first, length) if length else bracket.first
+            return math.nan if place is None else value(place)
+
+        return root(at, 0.0, bracket.length, ROOT_LENGTH)
 
     def _parts(self, before: CurvePoint, after: CurvePoint, blocks: list[int] | slice) -> Vector:
         """Return the determinants of blocks, as parts of what they were."""
@@ -222,28 +221,3 @@ def _tangent(matrix: Vector, towards: Vector) -> Vector:
         tangent = np.linalg.svd(matrix)[2][-1]
         tangent = tangent if tangent @ towards >= 0 else -tangent
     return tangent / np.linalg.norm(tangent)
-
-
-def _root(function: Callable[[float], float | None], length: float) -> float:
-    """Return a zero in (0, length) of a function that changes its sign there.
-
-    Regula falsi with the weights of the Illinois method; a bisection every third step.
-    """
-    low, high = 0.0, length
-    at_low, at_high = function(low), function(high)
-    if at_low is None or at_high is None or at_low == 0 or at_high == 0:
-        return low if at_low == 0 else high
-    for k in range(ROOT_STEPS):
-        middle = (low + high) / 2
-        if k % 3 < 2 and at_high != at_low:  # of numbers like 1e-300 the halves may both vanish
-            middle = (low * at_high - high * at_low) / (at_high - at_low)
-        value = function(middle)
-        if value is None:  # rounding errors at the singular point itself
-            return middle
-        if value == 0 or high - low <= ROOT_LENGTH:
-            return middle
-        if value * at_low > 0:
-            low, at_low, at_high = middle, value, at_high / 2
-        else:
-            high, at_high, at_low = middle, value, at_low / 2
-    return (low + high) / 2
