@@ -1227,15 +1227,15 @@ const spatial_slider_crank = (() => {
     const solver = (() => {
         const CONVERGED = 0, NOT_CONVERGED = 1, SINGULAR = 2, NOT_FINITE = 3, NOT_REACHED = 4, AT_CORNER = 5;
         const NOT_ASSEMBLED = 6, LOCK_UP = 7;
-        // the criteria of the runtime; residuals at the end are relative to their terms
+        // the criteria of the runtime
         const AGREEMENT = 1e-06, ALLOWED_PART = 0.25, ARC_CORRECTIONS = 12, AROUND = 0.002,
-            AROUND_OFFSETS = [-2.0, -1.0, 1.0, 2.0], ASTRAY = 5.0, AS_NEAR = 1.1, AT_EVENT = 1e-09,
-            BEND = 0.01, BESIDE = [0.0, -1e-08, 1e-08, -1e-06, 1e-06, -1e-05], CONSTANT = 1e-12,
-            CORNER = 1e-09, FAR = 0.7853981633974483, FIRST_ARC = 0.01, FOLDED = 1e-09, INVOLVED = 0.02,
-            IN_RANGE = 1e-06, KINK = 8.0, LARGEST_ANGLE = 0.5, LARGE_ERROR = 0.5, LATE = 1e-06,
-            LONGEST_ARC = 0.05, LONGEST_P = 2.0, MAX_ARCS = 400, MAX_CORRECTIONS = 6,
-            MAX_ITERATIONS = 25, MAX_SUBSTEPS = 10000, MIRRORED = 2.0, MIRROR_STEP = 1e-05,
-            MOST_MIRRORED = 300, MOST_TURNED = 300, NEARLY_SINGULAR = 30.0,
+            AROUND_OFFSETS = [-2.0, -1.0, 1.0, 2.0], ASSEMBLED = 1e-09, ASTRAY = 5.0, AS_NEAR = 1.1,
+            AT_EVENT = 1e-09, BEND = 0.01, BESIDE = [0.0, -1e-08, 1e-08, -1e-06, 1e-06, -1e-05],
+            CONSTANT = 1e-12, CORNER = 1e-09, FAR = 0.7853981633974483, FIRST_ARC = 0.01,
+            FOLDED = 1e-09, INVOLVED = 0.02, IN_RANGE = 1e-06, KINK = 8.0, LARGEST_ANGLE = 0.5,
+            LARGE_ERROR = 0.5, LATE = 1e-06, LONGEST_ARC = 0.05, LONGEST_P = 2.0, MAX_ARCS = 400,
+            MAX_CORRECTIONS = 6, MAX_ITERATIONS = 25, MAX_SUBSTEPS = 10000, MIRRORED = 2.0,
+            MIRROR_STEP = 1e-05, MOST_MIRRORED = 300, MOST_TURNED = 300, NEARLY_SINGULAR = 30.0,
             NEAR_ANGLE = 0.5235987755982988, NEAR_PART = 0.1, NUDGE = 0.3, OTHER_SIZE = 100.0,
             PATIENCE = 8, RESIDUAL_FACTOR = 10.0, RESTARTS = 4, ROOT_LENGTH = 1e-13, ROOT_STEPS = 80,
             ROUNDING = 3.552713678800501e-15, SAME_POSITION = 1e-06, SAME_TIME = 8.881784197001252e-16,
@@ -1243,9 +1243,10 @@ const spatial_slider_crank = (() => {
             SINGULAR_SENSITIVITY = 10000000.0, SMALLEST_PART = 9.5367431640625e-07,
             SMALL_CORRECTION = 1e-12, SMALL_ERROR = 0.05, SMALL_PART = 1e-08, SMOOTH = 1e-09,
             SOLVED = 1e-10, SPATIAL_COORDINATES = 7, STEEP = 1000000.0, STRAIGHT = 0.98,
-            SUFFICIENT = 0.0001, THROWN = 10.0, TOLERABLE_CORRECTION = 1e-07, TOLERANCE = 1e-10,
-            TOO_NEAR = 100000.0, WILD = 1000.0;
-        const ASSEMBLED = RESIDUAL_FACTOR * TOLERANCE;
+            SUFFICIENT = 0.0001, THROWN = 10.0, TINY = 1e-300, TOLERABLE_CORRECTION = 1e-07,
+            TOLERANCE = 1e-10, TOO_NEAR = 100000.0, WILD = 1000.0;
+        const N = N_COORDINATES, M = N_EQUATIONS, NONZEROS = PATTERN.length;
+        const BLOCKS = point().determinants.length, PROBE = probeOf(Math.max(N, M));
 
         const norm = vector => Math.hypot(...vector);
         const largest = vector => vector.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
@@ -1456,16 +1457,25 @@ const spatial_slider_crank = (() => {
                 this.noise = new Float64Array(m);
                 this.limit = new Float64Array(m).fill(Infinity);
                 this.sums = new Float64Array(m);
-                this.none = new Float64Array(n);
-                // By what part of their terms equations of rates may be missed.
-                this.parts = Float64Array.from(model.EQUATIONS, name => ((model.REDUNDANT ?? []).includes(name) ? AGREEMENT : SOLVED));
                 const generic = this.evaluate(this.place.map((_, k) => q[k] + this.reference[k] * this.probe[k]), t);
-                if (!allFinite(generic.Phi) || !allFinite(generic.Phi_q)) return;
-                const own = this.terms(generic, this.reference).map(rounded);
-                const here = this.terms(generic, this.reference.map((x, k) => x + this.place[k])).slice();
+                const isKnown = allFinite(generic.Phi) && allFinite(generic.Phi_q);
+                const measured = isKnown ? generic : this.evaluate(q, t);
+                const own = this.terms(measured, this.reference).map(rounded);
+                const here = this.terms(measured, this.reference.map((x, k) => x + this.place[k])).slice();
+                this.scales = this.scalesOf(own, here.map(x => ROUNDING * x));
+                if (!isKnown) return;
                 this.magnitude = own;
-                this.noise = here.map(x => ROUNDING * x);
+                this.noise = this.scales.noise;
                 this.limit = here.map(x => (x > 0 ? STEEP * x : Infinity));
+            }
+
+            /* By what the march judges points. */
+            scalesOf(magnitude, noise) {
+                const { model, reference, floor } = this, redundant = model.REDUNDANT ?? [];
+                // By what part of their terms equations of rates may be missed.
+                const part = model.EQUATIONS.map(name => (redundant.includes(name) ? AGREEMENT : SOLVED));
+                const here = magnitude.slice(), inverse = reference.map(x => 1 / x);
+                return { reference, inverse, magnitude, noise, here, part, tolerance: Math.max(TOLERANCE, floor) };
             }
 
             /* A point with Phi and Phi_q. */
@@ -1778,155 +1788,291 @@ const spatial_slider_crank = (() => {
 
         /* ---- from time to time ---- */
 
-        /* Takes a motion from time to time. With `isDense` the matrices are solved with pivoting. */
-        class March {
-            constructor(equations) {
-                Object.assign(this, { equations, model: equations.model, isDense: false, iterations: 0 });
-                this.tolerance = Math.max(TOLERANCE, equations.floor);
-                this.residual = Math.max(ASSEMBLED, ROUNDING);
-                const vector = () => new Float64Array(equations.n);
-                [this.change, this.predicted, this.rounding, this.expected] = [vector(), vector(), vector(), vector()];
-                this.missing = new Float64Array(equations.m);
-                this.sides = equations.magnitude.map((x, i) => x * equations.probe[i]);
-            }
+        // What became of points; those that are over are not looked at any more.
+        const new_outcome = () => ({
+            status: 0,
+            iterations: 0,
+            is_over: false,
+            residual: 0,
+            sensitivity: 0,
+            is_there: false,  // whether it is a position of the motion, even one without rates
+        });
 
-            prepare(at) {
-                this.model.factor_at(at);
-                at.dense = null;
-                if (this.isDense) this.equations.factors(at);
+        // Measure the equations where points are, for scales of the coordinates.
+        function measure_here(b, s, scale) {
+            for (let i = 0; i < M; i += 1) {
+                s.here[i] = 0.0;
             }
-
-            solve(at, right, to) {
-                if (this.isDense) to.set(solve(at.dense, independent(this.model, right)));
-                else this.model.solve_at(at.F, right, to);
+            for (let e = 0; e < NONZEROS; e += 1) {
+                const i = PATTERN[e][0];
+                const j = PATTERN[e][1];
+                s.here[i] += Math.abs(b.Phi_q[e]) * scale[j];
             }
+            for (let i = 0; i < M; i += 1) {
+                // An equation that is so much steeper than at a generic position is beside a pole.
+                const steepest = STEEP / ROUNDING * s.noise[i];
+                const here = s.here[i] < steepest ? s.here[i] : steepest;
+                s.here[i] = here > s.magnitude[i] ? here : s.magnitude[i];
+            }
+        }
 
-            /* Newton's method from a prediction; says whether it converged. */
-            correct(at, most) {
-                const { model, equations, change, rounding } = this, { n, reference } = equations;
-                for (let k = 0; k < n; k += 1) rounding[k] = ROUNDING * Math.abs(at.q[k]);
-                let last = Infinity;
-                model.position_at(at);
-                for (let iteration = 0; iteration < most; iteration += 1) {
-                    this.iterations += 1;
-                    this.prepare(at);
-                    this.solve(at, at.Phi, change);
-                    let size = -Infinity;
-                    for (let k = 0; k < n; k += 1) {
-                        at.q[k] -= change[k];
-                        const part = (Math.abs(change[k]) - rounding[k]) / reference[k];
-                        if (!(part <= size)) size = part;
+        const scale_of_holds_to_rounding = new Float64Array(N);
+        // Say whether every equation holds as well as floating point permits.
+        function holds_to_rounding(b, s) {
+            let holds = true;
+            position_at(b);
+            for (let i = 0; i < N; i += 1) {
+                scale_of_holds_to_rounding[i] = Math.abs(b.q[i]) > s.reference[i] ? Math.abs(b.q[i])
+                    : s.reference[i];
+            }
+            measure_here(b, s, scale_of_holds_to_rounding);
+            for (let i = 0; i < M; i += 1) {
+                holds = holds && Math.abs(b.Phi[i]) <= ROUNDING * s.here[i];
+            }
+            return holds;
+        }
+
+        const first_of_meets_rates = new Float64Array(M), second_of_meets_rates = new Float64Array(M);
+        // Say whether velocity and acceleration, of these sizes, meet their equations.
+        function meets_rates(b, s, speed, gain) {
+            first_of_meets_rates.set(b.nu);
+            second_of_meets_rates.set(b.gamma);
+            let is_met = true;
+            for (let e = 0; e < NONZEROS; e += 1) {
+                const i = PATTERN[e][0];
+                const j = PATTERN[e][1];
+                first_of_meets_rates[i] -= b.Phi_q[e] * b.q_dot[j];
+                second_of_meets_rates[i] -= b.Phi_q[e] * b.q_ddot[j];
+            }
+            for (let i = 0; i < M; i += 1) {
+                const allowed = s.part[i] * s.here[i];
+                is_met = is_met && Math.abs(first_of_meets_rates[i]) <= allowed * speed;
+                is_met = is_met && Math.abs(second_of_meets_rates[i]) <= allowed * gain;
+            }
+            return is_met;
+        }
+
+        const change_of_correct = new Float64Array(N);
+        // Apply corrections until they are small, in scales of the coordinates. A point whose corrections
+        // are stays where it is.
+        function correct(b, s, most, o) {
+            let going = !o.is_over;
+            let iterations = 0;
+            let last = Infinity;
+            for (let iteration = 0; iteration < most; iteration += 1) {
+                if (!going) {
+                    break;
+                }
+                let is_large = false;
+                position_at(b);
+                prepare(b);
+                solve_into(b, b.Phi, change_of_correct);
+                let size = 0.0;
+                for (let i = 0; i < N; i += 1) {
+                    b.q[i] -= going ? change_of_correct[i] : 0.0;
+                    const allowed = s.tolerance * s.reference[i] + ROUNDING * Math.abs(b.q[i]);
+                    is_large = is_large || !(Math.abs(change_of_correct[i]) <= allowed);
+                    const part_of_scale = Math.abs(change_of_correct[i]) * s.inverse[i];
+                    size = part_of_scale <= size ? size : part_of_scale;
+                }
+                iterations += Number(going);
+                going = going && is_large;
+                // Near a singular position rounding alone keeps the corrections above any bound.
+                const stalls = !(size <= 0.25 * last);
+                last = size;
+                if (going && stalls) {
+                    going = going && !(stalls && holds_to_rounding(b, s));
+                }
+            }
+            o.iterations = iterations;
+            o.status = going ? NOT_CONVERGED : CONVERGED;
+        }
+
+        const right_of_complete = new Float64Array(M), answer_of_complete = new Float64Array(N);
+        // Check that the equations hold and that Phi_q is regular; solve for the rates. These are looked
+        // at: elimination with pivots chosen beforehand may lose all digits. They may miss their equations
+        // by parts of their size, the sum of their components in scales; accelerations are measured by the
+        // square of the velocities too, which gamma is made of.
+        function complete(b, s, o) {
+            let is_off = false;
+            let speed = 0.0;
+            let gain = 0.0;
+            position_at(b);
+            prepare(b);
+            o.residual = 0.0;
+            o.sensitivity = 0.0;
+            measure_here(b, s, s.reference);
+            const terms = Math.max(RESIDUAL_FACTOR * s.tolerance, ROUNDING);
+            for (let i = 0; i < M; i += 1) {
+                const allowed = terms * s.here[i] + s.noise[i];
+                const size = Math.abs(b.Phi[i]);
+                o.residual = size > o.residual ? size : o.residual;
+                is_off = is_off || !(size <= allowed);
+                right_of_complete[i] = s.magnitude[i] * PROBE[i];
+            }
+            // A third right side, of the size of the equations' terms, shows how near to singular Phi_q is.
+            solve_into(b, right_of_complete, answer_of_complete);
+            nu_at(b);
+            solve_into(b, b.nu, b.q_dot);
+            gamma_at(b);
+            solve_into(b, b.gamma, b.q_ddot);
+            for (let i = 0; i < N; i += 1) {
+                const moved = Math.abs(answer_of_complete[i]) * s.inverse[i];
+                o.sensitivity = moved <= o.sensitivity ? o.sensitivity : moved;
+                speed += Math.abs(b.q_dot[i]) * s.inverse[i];
+                gain += Math.abs(b.q_ddot[i]) * s.inverse[i];
+            }
+            const first = speed * speed;
+            const second = gain + first;
+            const is_met = meets_rates(b, s, speed, second);
+            let found = is_met ? CONVERGED : SINGULAR;
+            found = Number.isFinite(first + second) ? found : NOT_FINITE;
+            found = o.sensitivity <= SINGULAR_SENSITIVITY ? found : SINGULAR;
+            found = is_off ? NOT_CONVERGED : found;
+            found = Number.isFinite(o.residual) ? found : NOT_FINITE;
+            o.status = o.status === CONVERGED ? found : o.status;
+        }
+
+        const before_of_step = new Float64Array(BLOCKS), q_of_step = new Float64Array(N),
+            q_dot_of_step = new Float64Array(N);
+        // Take points from where they are to other times. Those that end too far from the prediction q + h
+        // q_dot + h^2 q_ddot / 2 have not converged. Where the determinant of a block has changed its
+        // sign, a singular configuration lies between; near one, the velocity must be where it was
+        // predicted too, compared with the position's error.
+        function step(b, s, t, o) {
+            before_of_step.set(b.determinants);
+            const h = t - b.t;
+            b.t = t;
+            let movement = 0.0;
+            for (let i = 0; i < N; i += 1) {
+                const moved = Math.abs(h * (b.q_dot[i] + 0.5 * h * b.q_ddot[i])) * s.inverse[i];
+                movement = moved > movement ? moved : movement;
+                b.q[i] += h * (b.q_dot[i] + 0.5 * h * b.q_ddot[i]);
+                b.q_dot[i] += h * b.q_ddot[i];
+            }
+            q_of_step.set(b.q);
+            q_dot_of_step.set(b.q_dot);
+            correct(b, s, MAX_ITERATIONS, o);
+            complete(b, s, o);
+            let error = 0.0;
+            let kink = 0.0;
+            let has_crossed = false;
+            for (let i = 0; i < N; i += 1) {
+                const apart = Math.abs(b.q[i] - q_of_step[i]) * s.inverse[i];
+                const turn = Math.abs(h * (b.q_dot[i] - q_dot_of_step[i])) * s.inverse[i];
+                error = apart <= error ? error : apart;
+                kink = turn > kink ? turn : kink;
+            }
+            for (let i = 0; i < BLOCKS; i += 1) {
+                const stays = before_of_step[i] > 0.0 ? b.determinants[i] > 0.0
+                    : b.determinants[i] < 0.0;
+                has_crossed = has_crossed || !stays;
+            }
+            const is_bent = o.sensitivity > NEARLY_SINGULAR && kink > KINK * error + SMOOTH;
+            const is_past = is_bent || (o.status === CONVERGED && has_crossed);
+            const allowed_part = ALLOWED_PART * movement;
+            let allowed = allowed_part > SMALL_ERROR ? allowed_part : SMALL_ERROR;
+            allowed = allowed < LARGE_ERROR ? allowed : LARGE_ERROR;
+            const is_position = o.status !== NOT_CONVERGED && Number.isFinite(o.residual)
+                && error <= allowed;
+            o.is_there = is_position && !(is_past && o.status === CONVERGED);
+            o.status = error <= allowed ? (is_past ? SINGULAR : o.status) : NOT_CONVERGED;
+        }
+
+        // Take a good point, of a sensitivity, to a time in sub-steps. These are halved where they fail
+        // and doubled where they do not; after one that was too long the next ones are no longer. What is
+        // near a singular position is not gone on from. Return whether the march ended, and was not given
+        // up.
+        function advance_carefully(b, s, at, nearness, t, o) {
+            let fastest = TINY;
+            for (let i = 0; i < N; i += 1) {
+                const speed = Math.abs(at.q_dot[i]) * s.inverse[i];
+                const gain = Math.sqrt(Math.abs(at.q_ddot[i]) * s.inverse[i]);
+                fastest = speed > fastest ? speed : fastest;
+                fastest = gain > fastest ? gain : fastest;
+            }
+            const smallest = Math.min(Math.abs(t - at.t), 1.0 / fastest) * SMALLEST_PART;
+            let near = nearness;
+            let h = t - at.t;
+            let iterations = 0;
+            let wait = 0;
+            for (let n = 0; n < MAX_SUBSTEPS; n += 1) {
+                const is_whole = Math.abs(h) >= Math.abs(t - at.t);
+                copy_state(b, at);
+                step(b, s, is_whole ? t : at.t + h, o);
+                iterations += o.iterations;
+                o.iterations = iterations;
+                if (is_whole && o.is_there) {
+                    return true;
+                }
+                const is_good = o.status === CONVERGED;
+                const is_near = is_good && o.sensitivity > Math.max(TOO_NEAR, near);
+                if (is_good && !is_near) {
+                    copy_state(at, b);
+                    near = o.sensitivity;
+                    wait = Math.max(wait - 1, 0);
+                    if (wait === 0 || Math.abs(2.0 * h) >= Math.abs(t - at.t)) {
+                        h *= 2.0;
                     }
-                    model.position_at(at);
-                    // Near a singular position rounding alone keeps the corrections above any bound.
-                    if (size <= this.tolerance || !(size <= last / 4)) {
-                        const isDone = (size <= this.tolerance && equations.holds(at, this.residual)) || equations.holdsToRounding(at);
-                        if (isDone || !(size < Infinity)) return isDone;
+                } else if (Math.abs(h) <= smallest) {
+                    if (is_near) {
+                        o.status = SINGULAR;
                     }
-                    last = size;
+                    o.is_there = false;
+                    return true;
+                } else {
+                    h *= 0.5;
+                    wait = PATIENCE;
                 }
-                return false;
             }
+            o.status = NOT_CONVERGED;
+            o.is_there = false;
+            return false;
+        }
 
-            /* Solve for velocity and acceleration; a third right side, of the size of the equations' own
-               terms, shows how near to singular Phi_q is. */
-            complete(at) {
-                const { model, change, equations } = this;
-                this.prepare(at);
-                this.solve(at, this.sides, change);
-                model.nu_at(at);
-                this.solve(at, at.nu, at.q_dot);
-                model.gamma_at(at);
-                this.solve(at, at.gamma, at.q_ddot);
-                at.sensitivity = 0;
-                let sum = 0;
-                for (let k = 0; k < equations.n; k += 1) {
-                    const size = Math.abs(change[k]) / equations.reference[k];
-                    if (!(size <= at.sensitivity)) at.sensitivity = size;
-                    sum += at.q_dot[k] + at.q_ddot[k];
-                }
-                if (!(at.sensitivity < SINGULAR_SENSITIVITY)) return whySingular(at);
-                if (!Number.isFinite(sum)) return NOT_FINITE;
-                return this.areMet(at) ? CONVERGED : SINGULAR;
-            }
+        /* ---- what the march says of points ---- */
 
-            /* Whether velocity and acceleration meet Phi_q x = b: elimination with pivots chosen beforehand may
-               lose all digits. Accelerations are measured by the square of the velocities too, which gamma
-               is made of. */
-            areMet(at) {
-                const { equations } = this, { PATTERN } = equations.model, { m, none } = equations;
-                const terms = equations.terms(at, equations.reference), missing = this.missing;
-                const speed = equations.distance(at.q_dot, none), growth = equations.distance(at.q_ddot, none) + speed * speed;
-                for (const [x, b, size] of [[at.q_dot, at.nu, speed], [at.q_ddot, at.gamma, growth]]) {
-                    for (let i = 0; i < m; i += 1) missing[i] = -b[i];
-                    for (let k = 0; k < PATTERN.length; k += 1) missing[PATTERN[k][0]] += at.Phi_q[k] * x[PATTERN[k][1]];
-                    for (let i = 0; i < m; i += 1) {
-                        if (!(Math.abs(missing[i]) <= equations.parts[i] * terms[i] * size)) return false;
-                    }
-                }
-                return true;
-            }
+        /* A point; one that has `equations` is solved with pivoting. */
+        const spare = (p, equations = null) => Object.assign(point(p), { equations, dense: null, sensitivity: 0 });
 
-            /* Take a step from a good point: `to` counts only where it continues the motion. `to.isThere`
-               says whether it is a position of the motion at that time. */
-            step(from, to, t, most) {
-                const { equations, predicted } = this, { n, reference } = equations, h = t - from.t;
-                for (let k = 0; k < n; k += 1) {
-                    predicted[k] = from.q[k] + h * (from.q_dot[k] + h / 2 * from.q_ddot[k]);
-                }
-                to.q.set(predicted);
-                to.t = t;
-                to.isThere = false;
-                const isGood = this.correct(to, most);
-                const error = equations.distance(to.q, predicted), movement = equations.distance(predicted, from.q);
-                if (!isGood || !(error <= Math.min(LARGE_ERROR, Math.max(SMALL_ERROR, ALLOWED_PART * movement)))) return NOT_CONVERGED;
-                const status = this.complete(to);
-                to.isThere = status !== CONVERGED;
-                if (status !== CONVERGED) return status;
-                for (let k = 0; k < from.determinants.length; k += 1) {
-                    if (Math.sign(from.determinants[k]) !== Math.sign(to.determinants[k])) return SINGULAR;
-                }
-                let kink = 0;
-                for (let k = 0; k < n; k += 1) {
-                    const turn = Math.abs(h * (to.q_dot[k] - from.q_dot[k] - h * from.q_ddot[k])) / reference[k];
-                    if (!(turn <= kink)) kink = turn;
-                }
-                if (!(to.sensitivity <= NEARLY_SINGULAR || kink <= KINK * error + SMOOTH)) return SINGULAR;
-                to.isThere = true;
-                return CONVERGED;
-            }
+        function copy_state(to, from) {
+            to.t = from.t;
+            to.q.set(from.q);
+            to.q_dot.set(from.q_dot);
+            to.q_ddot.set(from.q_ddot);
+            to.determinants.set(from.determinants);
+        }
 
-            /* The time in which something moves as far as its scale. */
-            timeOf({ q_dot, q_ddot }) {
-                const part = (vector) => largest(vector.map((x, k) => x / this.equations.reference[k]));
-                return 1 / Math.max(part(q_dot), Math.sqrt(part(q_ddot)), 1e-300);
-            }
+        function prepare(at) {
+            factor_at(at);
+            at.dense = null;
+            if (at.equations) at.equations.factors(at);
+        }
 
-            /* Follow the motion from a good point to a time, in sub-steps that are halved where they fail
-               and doubled where they do not. */
-            advance(from, t, most = MAX_ITERATIONS) {
-                const spare = () => this.model.point(this.equations.p);
-                let h = t - from.t, state = from, to = spare(), status = NOT_CONVERGED, wait = 0;
-                const smallest = Math.min(Math.abs(h), this.timeOf(from)) * SMALLEST_PART;
-                for (let count = 0; count < MAX_SUBSTEPS; count += 1) {
-                    const isWhole = Math.abs(h) >= Math.abs(t - state.t);
-                    status = this.step(state, to, isWhole ? t : state.t + h, most);
-                    const isGood = status === CONVERGED;
-                    const isNear = isGood && to.sensitivity > Math.max(TOO_NEAR, state.sensitivity);
-                    if (isNear && !isWhole) status = SINGULAR;
-                    if (isWhole && to.isThere) return { status, state: isGood ? to : state, position: to };
-                    if (isGood && !isNear) {
-                        // After a step that was too long the next ones are no longer.
-                        [state, to, wait] = [to, spare(), Math.max(wait - 1, 0)];
-                        if (!wait || Math.abs(2 * h) >= Math.abs(t - state.t)) h *= 2;
-                    } else if (Math.abs(h) <= smallest) {
-                        return { status, state, position: null };
-                    } else {
-                        [h, wait] = [h / 2, PATIENCE];
-                    }
-                }
-                return { status: NOT_CONVERGED, state, position: null, isExhausted: true };
-            }
+        function solve_into(at, right, to) {
+            if (at.dense) to.set(solve(at.dense, independent(at.equations.model, right)));
+            else solve_at(at.F, right, to);
+        }
+
+        /* Solve for velocity and acceleration at a position, with pivoting; returns its status. */
+        function completed(at, equations) {
+            const found = new_outcome();
+            at.equations = equations;
+            complete(at, equations.scales, found);
+            Object.assign(at, { equations: null, sensitivity: found.sensitivity });
+            return found.status;
+        }
+
+        /* Follow the motion from a good point to a time, in sub-steps and with pivoting. `position` is what
+           was found at that time, `state` the last point to go on from. */
+        function advance(equations, from, t) {
+            const at = spare(equations.p), last = spare(equations.p, equations), found = new_outcome();
+            copy_state(at, from);
+            const isExhausted = !advance_carefully(last, equations.scales, at, from.sensitivity, t, found);
+            const { status, iterations, sensitivity } = found, position = found.is_there ? last : null;
+            Object.assign(last, { equations: null, sensitivity });
+            position_at(at);
+            return { status, iterations, isExhausted, state: status === CONVERGED ? last : at, position };
         }
 
         /* ---- the whole grid ---- */
@@ -1972,35 +2118,38 @@ const spatial_slider_crank = (() => {
             const corners = cornersOf(model, Float64Array.from(times), p, guess);
             const timeOf = k => times[k] + corners[k];
             let outcome = start(model, p, guess, timeOf(0));
-            const { equations, other = null, strays = false } = outcome;
-            let march = new March(equations);
+            const { other = null, strays = false } = outcome;
+            let equations = outcome.equations;
             Object.assign(motion, { equations, other, strays });
             record(motion, 0, outcome, model);
             motion.iterations[0] = outcome.iterations;
-            let from = outcome.state, to = model.point(p);
+            const found = new_outcome();
+            let from = outcome.state, to = spare(p);
             for (let k = 1; k < count && outcome.status === CONVERGED; k += 1) {
-                Object.assign(march, { isDense: false, iterations: 0 });
-                const status = march.step(from, to, timeOf(k), MAX_CORRECTIONS);
-                if (status === CONVERGED && to.sensitivity <= TOO_NEAR) {
-                    outcome = { status, state: to, position: to };
+                const t = timeOf(k);
+                copy_state(to, from);
+                step(to, equations.scales, t, found);
+                motion.iterations[k] = found.iterations;
+                if (found.status === CONVERGED && found.sensitivity <= TOO_NEAR) {
+                    to.sensitivity = found.sensitivity;
+                    outcome = { status: CONVERGED, state: to, position: to };
                     record(motion, k, outcome, model);
-                    motion.iterations[k] = march.iterations;
                     [from, to] = [to, from];
                     continue;
                 }
-                march.isDense = true;
-                outcome = march.advance(from, timeOf(k));
-                const fresh = isDoubtful(outcome) && measuredAgain(march, from);
+                outcome = advance(equations, from, t);
+                motion.iterations[k] += outcome.iterations;
+                const fresh = isDoubtful(outcome) && measuredAgain(equations, from);
                 if (fresh) {
-                    [march, motion.equations] = [fresh, fresh.equations];
-                    outcome = march.advance(from, timeOf(k));
+                    equations = motion.equations = fresh;
+                    outcome = advance(equations, from, t);
+                    motion.iterations[k] += outcome.iterations;
                 }
-                motion.iterations[k] = march.iterations;
-                if (!outcome.position && !outcome.isExhausted) outcome = giveUp(motion.equations, outcome, timeOf(k));
+                if (!outcome.position && !outcome.isExhausted) outcome = giveUp(equations, outcome, t);
                 record(motion, k, outcome, model);
                 // Rates near a singularity are too uncertain to predict from: the point before serves.
                 if (outcome.state.sensitivity <= Math.max(TOO_NEAR, from.sensitivity)) {
-                    [from, to] = [outcome.state, model.point(p)];
+                    [from, to] = [outcome.state, spare(p)];
                 }
             }
             if (outcome.status !== CONVERGED) {
@@ -2020,12 +2169,12 @@ const spatial_slider_crank = (() => {
             return !isExhausted && (status !== CONVERGED || state.sensitivity > TOO_NEAR);
         }
 
-        /* The march by the equations measured where the motion has come to, if they are others there: exp(-x)
-           is not nearly singular at x = 20, it is small. */
-        function measuredAgain({ equations, iterations }, { q, t }) {
+        /* The equations measured where the motion has come to, if they are others there: exp(-x) is not
+           nearly singular at x = 20, it is small. */
+        function measuredAgain(equations, { q, t }) {
             const fresh = new Problem(equations.model, equations.p, q, t);
             const isOther = (now, i) => now < equations.magnitude[i] / OTHER_SIZE || now > equations.magnitude[i] * OTHER_SIZE;
-            return fresh.magnitude.some(isOther) && Object.assign(new March(fresh), { isDense: true, iterations });
+            return fresh.magnitude.some(isOther) && fresh;
         }
 
         /* Assemble the mechanism at the first time. */
@@ -2036,9 +2185,8 @@ const spatial_slider_crank = (() => {
                 const status = attempt.status === NOT_CONVERGED ? NOT_ASSEMBLED : attempt.status;
                 return { status, iterations, equations: rough, state: null, position: null, nearest: attempt.last };
             }
-            const march = new March(rough), at = attempt.last;
-            march.isDense = true;
-            let status = march.complete(at);
+            const at = attempt.last;
+            let status = completed(at, rough);
             // Towards a singular position Newton's method creeps, and ends a rounding error before it.
             if (status === CONVERGED && crawls(attempt.corrections) && at.sensitivity > TOO_NEAR) status = SINGULAR;
             // The guess may be rough: from here on the assembled mechanism gives the size.
@@ -2082,10 +2230,9 @@ const spatial_slider_crank = (() => {
             const { equations, t: times, q, status } = motion, { n, model } = equations;
             const order = [...times.keys()].sort((a, b) => Math.abs(times[a] - t) - Math.abs(times[b] - t));
             for (const k of order.slice(0, 2).filter(place => status[place] === CONVERGED)) {
-                const march = new March(equations), from = equations.evaluate(q.subarray(k * n, (k + 1) * n), times[k]);
-                march.isDense = true;
-                if (march.complete(from) !== CONVERGED) continue;
-                const { state, position } = march.advance(from, t, MAX_CORRECTIONS);
+                const from = equations.evaluate(q.subarray(k * n, (k + 1) * n), times[k]);
+                if (completed(from, equations) !== CONVERGED) continue;
+                const { state, position } = advance(equations, from, t);
                 if (!position) continue;
                 if (model.OUTPUTS.length) model.observe_at(state);
                 return state;
@@ -2329,9 +2476,8 @@ const spatial_slider_crank = (() => {
         function locatedFromPoint({ equations, failed, q, t }) {
             const k = failed.index - 1, { n } = equations;
             if (k < 0) return null;
-            const march = new March(equations), at = equations.evaluate(q.subarray(k * n, (k + 1) * n), t[k]);
-            march.isDense = true;
-            return march.complete(at) === CONVERGED ? located(equations, at, failed.t) : null;
+            const at = equations.evaluate(q.subarray(k * n, (k + 1) * n), t[k]);
+            return completed(at, equations) === CONVERGED ? located(equations, at, failed.t) : null;
         }
 
         return {

@@ -75,6 +75,28 @@ def operands(nodes: Iterable[int], printer: Printer) -> list[str]:
     return [f"    {line}" for line in wrapped([printer.text(node) for node in nodes])]
 
 
+def block_call(write: Statements, opened: str) -> Call:
+    """Return what solves a block by a call with arrays that gives an array, or its determinant.
+
+    `opened` is how a call begins, with its name, the block's size and the array of the matrix.
+    """
+
+    def call(step: BlockCall, printer: Printer) -> list[str]:
+        name = f"block_of_{step.names[0]}" if step.right else step.names[0]
+        begun = opened.format("block_solve" if step.right else "block_determinant", step.size)
+        right = ["], [", *operands(step.right, printer)] if step.right else []
+        taken = [(own, f"{name}[{k}]") for k, own in enumerate(step.names)] if step.right else []
+        return [
+            f"{write.value.format(name)} = {begun}",
+            *operands(step.matrix, printer),
+            *right,
+            "]);",
+            *(f"{write.value.format(own)} = {entry};" for own, entry in taken),
+        ]
+
+    return call
+
+
 def _steps(
     write: Statements, steps: Iterable[Assignment | BlockCall], printer: Printer, call: Call
 ) -> list[str]:

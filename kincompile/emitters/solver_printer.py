@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import textwrap
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from kincompile.emitters.lines import broken
 from kincompile.solver.nodes import (
+    LANE,
     Assign,
     Binary,
     Break,
@@ -204,3 +206,33 @@ class SolverPrinter:
         """Return a call."""
         arguments = [self.expression(x) for x in node.arguments]
         return f"{self.calls.get(node.name, node.name)}({', '.join(arguments)})", ATOM
+
+
+class OneLane(SolverPrinter):
+    """Prints a solver in a language that takes one point at a time: a lane is a number."""
+
+    def constant(self, node: Constant) -> str:
+        """Return a number or the name of one."""
+        return str(node.value).lower() if isinstance(node.value, bool) else str(node.value)
+
+    def leaf(self, node: Name | Field | Index) -> tuple[str, int]:
+        """Return a variable, a field or an entry, without the index of the one lane."""
+        match node:
+            case Name(variable):
+                return variable.name, ATOM
+            case Field(struct, name):
+                return f"{struct.variable.name}.{name}", ATOM
+            case Index(array, indices):
+                if array.type.dims[len(indices) - 1] == LANE:
+                    indices = indices[:-1]
+                text = self.expression(array)
+                return text + "".join(f"[{self.expression(x)}]" for x in indices), ATOM
+
+    def call(self, node: Call) -> tuple[str, int]:
+        """Return a call; what any lane is, the one is, and copying is an assignment's."""
+        match node.name, node.arguments:
+            case "any_lane" | "copied", (value,):
+                return self.strong(value)
+            case "take_up" | "put_at", (to, source, *_):
+                return super().call(replace(node, arguments=(to, source)))
+        return super().call(node)

@@ -12,6 +12,7 @@ from kincompile.quantities import quantity_named
 
 if TYPE_CHECKING:
     from kincompile.emitters.evaluators import Listing
+    from kincompile.emitters.planned_solve import SolveListing
     from kincompile.emitters.printer import Printer
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
@@ -52,6 +53,25 @@ class Statements:
         )
         own = "\n".join(f"{self.comment} {line}".rstrip() for line in lines)
         return f"{own}\n{self.header(code)}"
+
+    def facts(
+        self, code: InlineProgram, listing: SolveListing | None, text: str
+    ) -> dict[str, object]:
+        """Return what a template needs of a mechanism, whose functions have a text."""
+        program = code.program
+        return {
+            "name": program.name,
+            "fingerprint": program.fingerprint,
+            "header": self.heading(code),
+            "n": len(program.coordinates),
+            "m": len(program.equations),
+            "k": len(program.parameters),
+            "functions": text,
+            "has_square": "square(" in text,
+            "has_blocks": listing is not None and listing.plan.has_large_blocks,
+            "n_factors": 0 if listing is None else len(listing.factors),
+            "n_blocks": 0 if listing is None else len(listing.plan.determinants),
+        }
 
     def assigned(self, left: str, text: str, about: str = "") -> list[str]:
         """Return an assignment and a comment, a long one continued with indentation."""

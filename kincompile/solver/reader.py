@@ -11,7 +11,7 @@ import io
 import tokenize
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kincompile.solver.expressions import ARITHMETIC, Expressions, agrees, refused
 from kincompile.solver.nodes import (
@@ -38,18 +38,19 @@ from kincompile.solver.nodes import (
     Variable,
     While,
 )  # fmt: skip
-from kincompile.solver.vocabulary import CONSTANTS
+from kincompile.solver.vocabulary import CAREFUL, CONSTANTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from kincompile.solver.nodes import Expression, Statement
 
 
 @cache
-def solver() -> Text:
-    """Return the march, read once."""
-    return read((files("kincompile.solver") / "text.py").read_text(encoding="utf-8"))
+def solver(*, is_careful: bool = False) -> Text:
+    """Return the march, read once: the plain one or the careful one."""
+    source = (files("kincompile.solver") / "text.py").read_text(encoding="utf-8")
+    return read(source, is_careful=is_careful)
 
 
 @cache
@@ -59,14 +60,17 @@ def start() -> Text:
     return read(source, {"Point": solver().structs["Point"]})
 
 
-def read(source: str, known: Mapping[str, Struct] | None = None) -> Text:
+def read(
+    source: str, known: Mapping[str, Struct] | None = None, *, is_careful: bool = False
+) -> Text:
     """Return the structs and functions of a text; a `Refused` names the line that is none.
 
     It may use known structs of another text.
     """
     text = Text({**(known or {})}, {})
-    comments = Comments(source)
-    for item in ast.parse(source).body:
+    tree, left_out = chosen(source, is_careful=is_careful)
+    comments = Comments(source, left_out)
+    for item in tree.body:
         match item:
             case ast.ClassDef(name=name):
                 text.structs[name] = _struct(item, text, comments)
@@ -79,12 +83,45 @@ def read(source: str, known: Mapping[str, Struct] | None = None) -> Text:
     return text
 
 
-class Comments:
-    """The comments of a source, by their lines."""
+def chosen(source: str, *, is_careful: bool) -> tuple[ast.Module, set[int]]:
+    """Return the text of one of the two marches, and the lines that are the other's."""
+    choice = _Chosen(is_careful)
+    return choice.visit(ast.parse(source)), choice.left_out
 
-    def __init__(self, source: str) -> None:
+
+class _Chosen(ast.NodeTransformer):
+    """Puts in place of an `if IS_CAREFUL` the branch that is meant, and notes the other's lines."""
+
+    def __init__(self, is_careful: bool) -> None:
+        self.is_careful = is_careful
+        self.left_out: set[int] = set()
+
+    def visit_If(self, node: ast.If) -> Any:
+        """Return a branch, or its chosen statements."""
+        self.generic_visit(node)
+        if ast.unparse(node.test) != CAREFUL:
+            return node
+        end = node.body[-1].end_lineno or node.lineno
+        if self.is_careful:
+            self.left_out |= set(range(end + 1, (node.end_lineno or end) + 1))
+            return node.body
+        self.left_out |= set(range(node.lineno, end + 1))
+        return node.orelse
+
+    def visit_IfExp(self, node: ast.IfExp) -> Any:
+        """Return a choice, or the value that is meant."""
+        self.generic_visit(node)
+        if ast.unparse(node.test) != CAREFUL:
+            return node
+        return node.body if self.is_careful else node.orelse
+
+
+class Comments:
+    """The comments of a source, by their lines, without those that are left out."""
+
+    def __init__(self, source: str, left_out: Collection[int]) -> None:
         tokens = tokenize.generate_tokens(io.StringIO(source).readline)
-        found = [x for x in tokens if x.type == tokenize.COMMENT]
+        found = [x for x in tokens if x.type == tokenize.COMMENT and x.start[0] not in left_out]
         self.notes = {x.start[0]: x.string[1:].strip() for x in found}
         self.alone = {x.start[0] for x in found if not x.line[: x.start[1]].strip()}
 

@@ -4,6 +4,9 @@ It runs on NumPy (`words.on_numpy`), and `reader.read` reads it. A `Lane` is a n
 points that are worked on together: an array in NumPy and C, a plain number where a language takes
 one point at a time. `Rows[N]` are N of them. A `Real` is the same for all. Nothing that differs
 from lane to lane decides an `if`: `where` chooses, `any_lane` asks all.
+
+What `IS_CAREFUL` chooses is the march that has the last word, with the rules of the runtime's: it
+goes as near to a singular position as rounding lets it. The other one hands over to it.
 """
 
 from __future__ import annotations
@@ -45,7 +48,11 @@ class Scales(Struct):
     inverse: Rows[N]  # and its inverse: a division takes as long as five products
     magnitude: Rows[M]  # what the terms of each equation contribute at a generic position
     noise: Rows[M]  # what rounding errors of the coordinates leave of each equation
-    weight: Rows[M]  # of the square of what an equation of rates misses
+    if IS_CAREFUL:
+        here: Rows[M]  # what the terms of each equation contribute where a point is
+        part: Rows[M]  # of its terms, by which an equation of rates may be missed
+    else:
+        weight: Rows[M]  # of the square of what an equation of rates misses
     tolerance: Real
 
 
@@ -57,8 +64,11 @@ class Outcome(Struct):
     is_over: LaneBool
     residual: Lane
     sensitivity: Lane
-    by_velocity: Lane  # by how much velocities miss their equations, squared
-    by_acceleration: Lane
+    if IS_CAREFUL:
+        is_there: LaneBool  # whether it is a position of the motion, even one without rates
+    else:
+        by_velocity: Lane  # by how much velocities miss their equations, squared
+        by_acceleration: Lane
 
 
 class Variants(Struct):
@@ -99,9 +109,60 @@ def measure(b: Point, size: Real, s: Scales):
         s.noise[i] += ROUNDING * slope * (s.reference[j] + abs(q[j]))
     for i in range(M):
         allowed = AGREEMENT if IS_REDUNDANT[i] else SOLVED
-        terms = allowed * s.magnitude[i]
-        s.weight[i] = 1.0 / (terms * allowed * s.magnitude[i])
+        if IS_CAREFUL:
+            s.part[i] = allowed
+        else:
+            terms = allowed * s.magnitude[i]
+            s.weight[i] = 1.0 / (terms * allowed * s.magnitude[i])
     b.q = q
+
+
+if IS_CAREFUL:
+
+    @lanewise
+    def measure_here(b: Point, s: Scales, scale: Rows[N]):
+        """Measure the equations where points are, for scales of the coordinates."""
+        for i in range(M):
+            s.here[i] = 0.0
+        for e in range(NONZEROS):
+            i = PATTERN[e][0]
+            j = PATTERN[e][1]
+            s.here[i] += abs(b.Phi_q[e]) * scale[j]
+        for i in range(M):
+            # An equation that is so much steeper than at a generic position is beside a pole.
+            steepest = STEEP / ROUNDING * s.noise[i]
+            here = where(s.here[i] < steepest, s.here[i], steepest)
+            s.here[i] = where(here > s.magnitude[i], here, s.magnitude[i])
+
+    @lanewise
+    def holds_to_rounding(b: Point, s: Scales) -> LaneBool:
+        """Say whether every equation holds as well as floating point permits."""
+        scale = rows(N)
+        holds: LaneBool = True
+        position(b)
+        for i in range(N):
+            scale[i] = where(abs(b.q[i]) > s.reference[i], abs(b.q[i]), s.reference[i])
+        measure_here(b, s, scale)
+        for i in range(M):
+            holds = holds & (abs(b.Phi[i]) <= ROUNDING * s.here[i])
+        return holds
+
+    @lanewise
+    def meets_rates(b: Point, s: Scales, speed: Lane, gain: Lane) -> LaneBool:
+        """Say whether velocity and acceleration, of these sizes, meet their equations."""
+        first = copied(b.nu)
+        second = copied(b.gamma)
+        is_met: LaneBool = True
+        for e in range(NONZEROS):
+            i = PATTERN[e][0]
+            j = PATTERN[e][1]
+            first[i] -= b.Phi_q[e] * b.q_dot[j]
+            second[i] -= b.Phi_q[e] * b.q_ddot[j]
+        for i in range(M):
+            allowed = s.part[i] * s.here[i]
+            is_met = is_met & (abs(first[i]) <= allowed * speed)
+            is_met = is_met & (abs(second[i]) <= allowed * gain)
+        return is_met
 
 
 @lanewise
@@ -112,6 +173,8 @@ def correct(b: Point, s: Scales, most: Int, o: Outcome):
     """
     going: LaneBool = ~o.is_over
     iterations: LaneInt = 0
+    if IS_CAREFUL:
+        last: Lane = INFINITE
     for iteration in range(most):
         if not any_lane(going):
             break
@@ -119,12 +182,23 @@ def correct(b: Point, s: Scales, most: Int, o: Outcome):
         position(b)
         factor(b)
         change = solve(b, b.Phi)
+        if IS_CAREFUL:
+            size: Lane = 0.0
         for i in range(N):
             b.q[i] -= where(going, change[i], 0.0)
             allowed = s.tolerance * s.reference[i] + ROUNDING * abs(b.q[i])
             is_large = is_large | ~(abs(change[i]) <= allowed)
+            if IS_CAREFUL:
+                part_of_scale = abs(change[i]) * s.inverse[i]
+                size = where(part_of_scale <= size, size, part_of_scale)
         iterations += going
         going = going & is_large
+        if IS_CAREFUL:
+            # Near a singular position rounding alone keeps the corrections above any bound.
+            stalls = ~(size <= 0.25 * last)
+            last = size
+            if any_lane(going & stalls):
+                going = going & ~(stalls & holds_to_rounding(b, s))
     o.iterations = iterations
     o.status = where(going, NOT_CONVERGED, CONVERGED)
 
@@ -145,9 +219,11 @@ def complete(b: Point, s: Scales, o: Outcome):
     factor(b)
     o.residual = 0.0
     o.sensitivity = 0.0
+    if IS_CAREFUL:
+        measure_here(b, s, s.reference)
     terms = max(RESIDUAL_FACTOR * s.tolerance, ROUNDING)
     for i in range(M):
-        allowed = terms * s.magnitude[i] + s.noise[i]
+        allowed = terms * (s.here[i] if IS_CAREFUL else s.magnitude[i]) + s.noise[i]
         size = abs(b.Phi[i])
         o.residual = where(size > o.residual, size, o.residual)
         is_off = is_off | ~(size <= allowed)
@@ -163,13 +239,21 @@ def complete(b: Point, s: Scales, o: Outcome):
         o.sensitivity = where(moved <= o.sensitivity, o.sensitivity, moved)
         speed += abs(b.q_dot[i]) * s.inverse[i]
         gain += abs(b.q_ddot[i]) * s.inverse[i]
-    missed(b, s.weight, o.by_velocity, o.by_acceleration)
-    first = speed * speed
-    second = (gain + first) * (gain + first)
-    is_met = (o.by_velocity <= first) & (o.by_acceleration <= second)
+    if IS_CAREFUL:
+        first = speed * speed
+        second = gain + first
+        is_met = meets_rates(b, s, speed, second)
+    else:
+        missed(b, s.weight, o.by_velocity, o.by_acceleration)
+        first = speed * speed
+        second = (gain + first) * (gain + first)
+        is_met = (o.by_velocity <= first) & (o.by_acceleration <= second)
     found = where(is_met, CONVERGED, SINGULAR)
     found = where(finite(first + second), found, NOT_FINITE)
-    found = where(o.sensitivity <= TOO_NEAR, found, SINGULAR)
+    if IS_CAREFUL:
+        found = where(o.sensitivity <= SINGULAR_SENSITIVITY, found, SINGULAR)
+    else:
+        found = where(o.sensitivity <= TOO_NEAR, found, SINGULAR)
     found = where(is_off, NOT_CONVERGED, found)
     found = where(finite(o.residual), found, NOT_FINITE)
     o.status = where(o.status == CONVERGED, found, o.status)
@@ -186,12 +270,17 @@ def step(b: Point, s: Scales, t: Lane, o: Outcome):
     before = copied(b.determinants)
     h = t - b.t
     b.t = t
+    if IS_CAREFUL:
+        movement: Lane = 0.0
     for i in range(N):
+        if IS_CAREFUL:
+            moved = abs(h * (b.q_dot[i] + 0.5 * h * b.q_ddot[i])) * s.inverse[i]
+            movement = where(moved > movement, moved, movement)
         b.q[i] += h * (b.q_dot[i] + 0.5 * h * b.q_ddot[i])
         b.q_dot[i] += h * b.q_ddot[i]
     q = copied(b.q)
     q_dot = copied(b.q_dot)
-    correct(b, s, MAX_CORRECTIONS, o)
+    correct(b, s, MAX_ITERATIONS if IS_CAREFUL else MAX_CORRECTIONS, o)
     complete(b, s, o)
     error: Lane = 0.0
     kink: Lane = 0.0
@@ -206,7 +295,17 @@ def step(b: Point, s: Scales, t: Lane, o: Outcome):
         has_crossed = has_crossed | ~stays
     is_bent = (o.sensitivity > NEARLY_SINGULAR) & (kink > KINK * error + SMOOTH)
     is_past = is_bent | ((o.status == CONVERGED) & has_crossed)
-    o.status = where(error <= SMALL_ERROR, where(is_past, SINGULAR, o.status), NOT_CONVERGED)
+    if IS_CAREFUL:
+        allowed_part = ALLOWED_PART * movement
+        allowed = where(allowed_part > SMALL_ERROR, allowed_part, SMALL_ERROR)
+        allowed = where(allowed < LARGE_ERROR, allowed, LARGE_ERROR)
+        is_position = (o.status != NOT_CONVERGED) & finite(o.residual) & (error <= allowed)
+        o.is_there = is_position & ~(is_past & (o.status == CONVERGED))
+    o.status = where(
+        error <= (allowed if IS_CAREFUL else SMALL_ERROR),
+        where(is_past, SINGULAR, o.status),
+        NOT_CONVERGED,
+    )
 
 
 def speed_of(b: Point, s: Scales) -> Real:
@@ -247,7 +346,10 @@ def scales_of(own: Scales, s: Scales, k: Count):
     for i in range(M):
         own.magnitude[i][0] = s.magnitude[i][k]
         own.noise[i][0] = s.noise[i][k]
-        own.weight[i][0] = s.weight[i][k]
+        if IS_CAREFUL:
+            own.part[i][0] = s.part[i][k]
+        else:
+            own.weight[i][0] = s.weight[i][k]
     for i in range(N):
         own.reference[i][0] = s.reference[i][k]
         own.inverse[i][0] = s.inverse[i][k]
@@ -295,6 +397,57 @@ def advance(b: Point, s: Scales, at: State, t: Real, k: Count, o: Outcome):
     o.iterations[k] = iterations
     take_up(at, alone, 0)
     put_at(b, at, k, k + 1)
+
+
+if IS_CAREFUL:
+
+    def advance_carefully(
+        b: Point, s: Scales, at: State, nearness: Real, t: Real, o: Outcome
+    ) -> Bool:
+        """Take a good point, of a sensitivity, to a time in sub-steps.
+
+        These are halved where they fail and doubled where they do not; after one that was too long
+        the next ones are no longer. What is near a singular position is not gone on from. Return
+        whether the march ended, and was not given up.
+        """
+        fastest: Real = TINY
+        for i in range(N):
+            speed = abs(at.q_dot[i]) * s.inverse[i][0]
+            gain = sqrt(abs(at.q_ddot[i]) * s.inverse[i][0])
+            fastest = speed if speed > fastest else fastest
+            fastest = gain if gain > fastest else fastest
+        smallest = min(abs(t - at.t), 1.0 / fastest) * SMALLEST_PART
+        near: Real = nearness
+        h: Real = t - at.t
+        iterations: Int = 0
+        wait: Int = 0
+        for n in range(MAX_SUBSTEPS):
+            is_whole = abs(h) >= abs(t - at.t)
+            put_at(b, at, 0, 1)
+            step(b, s, t if is_whole else at.t + h, o, lanes=1)
+            iterations += o.iterations[0]
+            o.iterations[0] = iterations
+            if is_whole and o.is_there[0]:
+                return True
+            is_good = o.status[0] == CONVERGED
+            is_near = is_good and o.sensitivity[0] > max(TOO_NEAR, near)
+            if is_good and not is_near:
+                take_up(at, b, 0)
+                near = o.sensitivity[0]
+                wait = max(wait - 1, 0)
+                if wait == 0 or abs(2.0 * h) >= abs(t - at.t):
+                    h *= 2.0
+            elif abs(h) <= smallest:
+                if is_near:
+                    o.status[0] = SINGULAR
+                o.is_there[0] = False
+                return True
+            else:
+                h *= 0.5
+                wait = PATIENCE
+        o.status[0] = NOT_CONVERGED
+        o.is_there[0] = False
+        return False
 
 
 def record(m: Variants, b: Point, o: Outcome, time: Count, first: Count, count: Count):

@@ -51,6 +51,13 @@ START_CRITERIA = (
 START_COUNTS = ("MOST_MIRRORED", "RESTARTS")
 """Those that the start judges by besides."""
 
+CAREFUL_COUNTS = ("MAX_ITERATIONS", "PATIENCE")
+CAREFUL_CRITERIA = ("ALLOWED_PART", "LARGE_ERROR", "SINGULAR_SENSITIVITY", "TINY")
+"""Those that the careful march judges by besides; and STEEP."""
+
+CAREFUL = "IS_CAREFUL"
+"""Chooses, where the text is read, which of two marches it is."""
+
 TABLES = {
     "ANGULAR": Type("bool", ("N",)),
     "IS_REDUNDANT": Type("bool", ("M",)),
@@ -64,8 +71,9 @@ as there are coordinates or equations), the row and column of each entry of Phi_
 are angles or may be, and of each the first of its body's Euler parameters (N: it is none)."""
 
 CONSTANTS = (
-    dict.fromkeys((*SIZES, *ROOM, *STATUSES, *COUNTS, *START_COUNTS), INT)
-    | dict.fromkeys((*CRITERIA, *START_CRITERIA, "NOTHING", "INFINITE", "TURN"), REAL)
+    dict.fromkeys((*SIZES, *ROOM, *STATUSES, *COUNTS, *START_COUNTS, *CAREFUL_COUNTS), INT)
+    | dict.fromkeys((*CRITERIA, *START_CRITERIA, *CAREFUL_CRITERIA), REAL)
+    | dict.fromkeys(("NOTHING", "INFINITE", "TURN"), REAL)
     | TABLES
 )
 """Names that have one value. `NOTHING` is the number that is none, `TURN` a whole one."""

@@ -7,9 +7,10 @@ kernels are the mechanism's. The values below stand for those until then.
 from __future__ import annotations
 
 import functools
-import importlib.util
 import inspect
 from dataclasses import dataclass
+from importlib.resources import files
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,10 +18,10 @@ from numpy.typing import NDArray
 
 from kincompile.criteria import rounded
 from kincompile.solver import vocabulary
+from kincompile.solver.reader import chosen
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from types import ModuleType
 
 Array = NDArray[Any]
 
@@ -45,14 +46,14 @@ class Mechanism:
     start: Array
 
 
-def on_numpy(mechanism: Mechanism) -> ModuleType:
+def on_numpy(mechanism: Mechanism, *, is_careful: bool = False) -> ModuleType:
     """Return the texts as a module that solves a mechanism: `march`, `start`, structs."""
     n, m = (mechanism.sizes[name] for name in ("N", "M"))
     sizes = {**mechanism.sizes, "TALL": m + n, "WIDE": n + 1}
     kernels = _Kernels(mechanism)
     own = {name: getattr(kernels, name) for name in (*vocabulary.KERNELS, "solve", "missed")}
-    module = _copy_of("kincompile.solver.start")
-    march = _copy_of("kincompile.solver.text")
+    module = _copy_of("start", is_careful=is_careful)
+    march = _copy_of("text", is_careful=is_careful)
     vars(module).update(
         {name: value for name, value in vars(march).items() if not name.startswith("_")}
     )
@@ -64,12 +65,12 @@ def on_numpy(mechanism: Mechanism) -> ModuleType:
     return module
 
 
-def _copy_of(name: str) -> ModuleType:
+def _copy_of(name: str, *, is_careful: bool) -> ModuleType:
     """Return a module of its own for a text."""
-    spec = importlib.util.find_spec(name)
-    assert spec is not None and spec.loader is not None  # noqa: PT018
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    place = files("kincompile.solver") / f"{name}.py"
+    tree, _ = chosen(place.read_text(encoding="utf-8"), is_careful=is_careful)
+    module = ModuleType(f"kincompile.solver.{name}")
+    exec(compile(tree, str(place), "exec"), vars(module))
     return module
 
 
@@ -243,6 +244,8 @@ def row(size: int) -> Array:
 copied, where, finite, lanes, floor, sqrt = np.copy, np.where, np.isfinite, range, np.floor, np.sqrt
 NOTHING, INFINITE, TURN = np.nan, np.inf, 2 * np.pi
 CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE, NOT_REACHED, LOCK_UP = vocabulary.STATUSES.values()
+
+IS_CAREFUL = False
 
 # Until a mechanism gives its own:
 N = M = K = LANES = NONZEROS = BLOCKS = TALL = WIDE = 0

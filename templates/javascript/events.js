@@ -234,7 +234,6 @@ function endOf(motion) {
 function locatedFromPoint({ equations, failed, q, t }) {
     const k = failed.index - 1, { n } = equations;
     if (k < 0) return null;
-    const march = new March(equations), at = equations.evaluate(q.subarray(k * n, (k + 1) * n), t[k]);
-    march.isDense = true;
-    return march.complete(at) === CONVERGED ? located(equations, at, failed.t) : null;
+    const at = equations.evaluate(q.subarray(k * n, (k + 1) * n), t[k]);
+    return completed(at, equations) === CONVERGED ? located(equations, at, failed.t) : null;
 }

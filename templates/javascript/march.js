@@ -1,154 +1,46 @@
-/* ---- from time to time ---- */
+/* ---- what the march says of points ---- */
 
-/* Takes a motion from time to time. With `isDense` the matrices are solved with pivoting. */
-class March {
-    constructor(equations) {
-        Object.assign(this, { equations, model: equations.model, isDense: false, iterations: 0 });
-        this.tolerance = Math.max(TOLERANCE, equations.floor);
-        this.residual = Math.max(ASSEMBLED, ROUNDING);
-        const vector = () => new Float64Array(equations.n);
-        [this.change, this.predicted, this.rounding, this.expected] = [vector(), vector(), vector(), vector()];
-        this.missing = new Float64Array(equations.m);
-        this.sides = equations.magnitude.map((x, i) => x * equations.probe[i]);
-    }
+/* A point; one that has `equations` is solved with pivoting. */
+const spare = (p, equations = null) => Object.assign(point(p), { equations, dense: null, sensitivity: 0 });
 
-    prepare(at) {
-        this.model.factor_at(at);
-        at.dense = null;
-        if (this.isDense) this.equations.factors(at);
-    }
+function copy_state(to, from) {
+    to.t = from.t;
+    to.q.set(from.q);
+    to.q_dot.set(from.q_dot);
+    to.q_ddot.set(from.q_ddot);
+    to.determinants.set(from.determinants);
+}
 
-    solve(at, right, to) {
-        if (this.isDense) to.set(solve(at.dense, independent(this.model, right)));
-        else this.model.solve_at(at.F, right, to);
-    }
+function prepare(at) {
+    factor_at(at);
+    at.dense = null;
+    if (at.equations) at.equations.factors(at);
+}
 
-    /* Newton's method from a prediction; says whether it converged. */
-    correct(at, most) {
-        const { model, equations, change, rounding } = this, { n, reference } = equations;
-        for (let k = 0; k < n; k += 1) rounding[k] = ROUNDING * Math.abs(at.q[k]);
-        let last = Infinity;
-        model.position_at(at);
-        for (let iteration = 0; iteration < most; iteration += 1) {
-            this.iterations += 1;
-            this.prepare(at);
-            this.solve(at, at.Phi, change);
-            let size = -Infinity;
-            for (let k = 0; k < n; k += 1) {
-                at.q[k] -= change[k];
-                const part = (Math.abs(change[k]) - rounding[k]) / reference[k];
-                if (!(part <= size)) size = part;
-            }
-            model.position_at(at);
-            // Near a singular position rounding alone keeps the corrections above any bound.
-            if (size <= this.tolerance || !(size <= last / 4)) {
-                const isDone = (size <= this.tolerance && equations.holds(at, this.residual)) || equations.holdsToRounding(at);
-                if (isDone || !(size < Infinity)) return isDone;
-            }
-            last = size;
-        }
-        return false;
-    }
+function solve_into(at, right, to) {
+    if (at.dense) to.set(solve(at.dense, independent(at.equations.model, right)));
+    else solve_at(at.F, right, to);
+}
 
-    /* Solve for velocity and acceleration; a third right side, of the size of the equations' own
-       terms, shows how near to singular Phi_q is. */
-    complete(at) {
-        const { model, change, equations } = this;
-        this.prepare(at);
-        this.solve(at, this.sides, change);
-        model.nu_at(at);
-        this.solve(at, at.nu, at.q_dot);
-        model.gamma_at(at);
-        this.solve(at, at.gamma, at.q_ddot);
-        at.sensitivity = 0;
-        let sum = 0;
-        for (let k = 0; k < equations.n; k += 1) {
-            const size = Math.abs(change[k]) / equations.reference[k];
-            if (!(size <= at.sensitivity)) at.sensitivity = size;
-            sum += at.q_dot[k] + at.q_ddot[k];
-        }
-        if (!(at.sensitivity < SINGULAR_SENSITIVITY)) return whySingular(at);
-        if (!Number.isFinite(sum)) return NOT_FINITE;
-        return this.areMet(at) ? CONVERGED : SINGULAR;
-    }
+/* Solve for velocity and acceleration at a position, with pivoting; returns its status. */
+function completed(at, equations) {
+    const found = new_outcome();
+    at.equations = equations;
+    complete(at, equations.scales, found);
+    Object.assign(at, { equations: null, sensitivity: found.sensitivity });
+    return found.status;
+}
 
-    /* Whether velocity and acceleration meet Phi_q x = b: elimination with pivots chosen beforehand may
-       lose all digits. Accelerations are measured by the square of the velocities too, which gamma
-       is made of. */
-    areMet(at) {
-        const { equations } = this, { PATTERN } = equations.model, { m, none } = equations;
-        const terms = equations.terms(at, equations.reference), missing = this.missing;
-        const speed = equations.distance(at.q_dot, none), growth = equations.distance(at.q_ddot, none) + speed * speed;
-        for (const [x, b, size] of [[at.q_dot, at.nu, speed], [at.q_ddot, at.gamma, growth]]) {
-            for (let i = 0; i < m; i += 1) missing[i] = -b[i];
-            for (let k = 0; k < PATTERN.length; k += 1) missing[PATTERN[k][0]] += at.Phi_q[k] * x[PATTERN[k][1]];
-            for (let i = 0; i < m; i += 1) {
-                if (!(Math.abs(missing[i]) <= equations.parts[i] * terms[i] * size)) return false;
-            }
-        }
-        return true;
-    }
-
-    /* Take a step from a good point: `to` counts only where it continues the motion. `to.isThere`
-       says whether it is a position of the motion at that time. */
-    step(from, to, t, most) {
-        const { equations, predicted } = this, { n, reference } = equations, h = t - from.t;
-        for (let k = 0; k < n; k += 1) {
-            predicted[k] = from.q[k] + h * (from.q_dot[k] + h / 2 * from.q_ddot[k]);
-        }
-        to.q.set(predicted);
-        to.t = t;
-        to.isThere = false;
-        const isGood = this.correct(to, most);
-        const error = equations.distance(to.q, predicted), movement = equations.distance(predicted, from.q);
-        if (!isGood || !(error <= Math.min(LARGE_ERROR, Math.max(SMALL_ERROR, ALLOWED_PART * movement)))) return NOT_CONVERGED;
-        const status = this.complete(to);
-        to.isThere = status !== CONVERGED;
-        if (status !== CONVERGED) return status;
-        for (let k = 0; k < from.determinants.length; k += 1) {
-            if (Math.sign(from.determinants[k]) !== Math.sign(to.determinants[k])) return SINGULAR;
-        }
-        let kink = 0;
-        for (let k = 0; k < n; k += 1) {
-            const turn = Math.abs(h * (to.q_dot[k] - from.q_dot[k] - h * from.q_ddot[k])) / reference[k];
-            if (!(turn <= kink)) kink = turn;
-        }
-        if (!(to.sensitivity <= NEARLY_SINGULAR || kink <= KINK * error + SMOOTH)) return SINGULAR;
-        to.isThere = true;
-        return CONVERGED;
-    }
-
-    /* The time in which something moves as far as its scale. */
-    timeOf({ q_dot, q_ddot }) {
-        const part = (vector) => largest(vector.map((x, k) => x / this.equations.reference[k]));
-        return 1 / Math.max(part(q_dot), Math.sqrt(part(q_ddot)), 1e-300);
-    }
-
-    /* Follow the motion from a good point to a time, in sub-steps that are halved where they fail
-       and doubled where they do not. */
-    advance(from, t, most = MAX_ITERATIONS) {
-        const spare = () => this.model.point(this.equations.p);
-        let h = t - from.t, state = from, to = spare(), status = NOT_CONVERGED, wait = 0;
-        const smallest = Math.min(Math.abs(h), this.timeOf(from)) * SMALLEST_PART;
-        for (let count = 0; count < MAX_SUBSTEPS; count += 1) {
-            const isWhole = Math.abs(h) >= Math.abs(t - state.t);
-            status = this.step(state, to, isWhole ? t : state.t + h, most);
-            const isGood = status === CONVERGED;
-            const isNear = isGood && to.sensitivity > Math.max(TOO_NEAR, state.sensitivity);
-            if (isNear && !isWhole) status = SINGULAR;
-            if (isWhole && to.isThere) return { status, state: isGood ? to : state, position: to };
-            if (isGood && !isNear) {
-                // After a step that was too long the next ones are no longer.
-                [state, to, wait] = [to, spare(), Math.max(wait - 1, 0)];
-                if (!wait || Math.abs(2 * h) >= Math.abs(t - state.t)) h *= 2;
-            } else if (Math.abs(h) <= smallest) {
-                return { status, state, position: null };
-            } else {
-                [h, wait] = [h / 2, PATIENCE];
-            }
-        }
-        return { status: NOT_CONVERGED, state, position: null, isExhausted: true };
-    }
+/* Follow the motion from a good point to a time, in sub-steps and with pivoting. `position` is what
+   was found at that time, `state` the last point to go on from. */
+function advance(equations, from, t) {
+    const at = spare(equations.p), last = spare(equations.p, equations), found = new_outcome();
+    copy_state(at, from);
+    const isExhausted = !advance_carefully(last, equations.scales, at, from.sensitivity, t, found);
+    const { status, iterations, sensitivity } = found, position = found.is_there ? last : null;
+    Object.assign(last, { equations: null, sensitivity });
+    position_at(at);
+    return { status, iterations, isExhausted, state: status === CONVERGED ? last : at, position };
 }
 
 /* ---- the whole grid ---- */
@@ -194,35 +86,38 @@ function motionOver(model, times, p = model.DEFAULTS, guess = model.GUESS) {
     const corners = cornersOf(model, Float64Array.from(times), p, guess);
     const timeOf = k => times[k] + corners[k];
     let outcome = start(model, p, guess, timeOf(0));
-    const { equations, other = null, strays = false } = outcome;
-    let march = new March(equations);
+    const { other = null, strays = false } = outcome;
+    let equations = outcome.equations;
     Object.assign(motion, { equations, other, strays });
     record(motion, 0, outcome, model);
     motion.iterations[0] = outcome.iterations;
-    let from = outcome.state, to = model.point(p);
+    const found = new_outcome();
+    let from = outcome.state, to = spare(p);
     for (let k = 1; k < count && outcome.status === CONVERGED; k += 1) {
-        Object.assign(march, { isDense: false, iterations: 0 });
-        const status = march.step(from, to, timeOf(k), MAX_CORRECTIONS);
-        if (status === CONVERGED && to.sensitivity <= TOO_NEAR) {
-            outcome = { status, state: to, position: to };
+        const t = timeOf(k);
+        copy_state(to, from);
+        step(to, equations.scales, t, found);
+        motion.iterations[k] = found.iterations;
+        if (found.status === CONVERGED && found.sensitivity <= TOO_NEAR) {
+            to.sensitivity = found.sensitivity;
+            outcome = { status: CONVERGED, state: to, position: to };
             record(motion, k, outcome, model);
-            motion.iterations[k] = march.iterations;
             [from, to] = [to, from];
             continue;
         }
-        march.isDense = true;
-        outcome = march.advance(from, timeOf(k));
-        const fresh = isDoubtful(outcome) && measuredAgain(march, from);
+        outcome = advance(equations, from, t);
+        motion.iterations[k] += outcome.iterations;
+        const fresh = isDoubtful(outcome) && measuredAgain(equations, from);
         if (fresh) {
-            [march, motion.equations] = [fresh, fresh.equations];
-            outcome = march.advance(from, timeOf(k));
+            equations = motion.equations = fresh;
+            outcome = advance(equations, from, t);
+            motion.iterations[k] += outcome.iterations;
         }
-        motion.iterations[k] = march.iterations;
-        if (!outcome.position && !outcome.isExhausted) outcome = giveUp(motion.equations, outcome, timeOf(k));
+        if (!outcome.position && !outcome.isExhausted) outcome = giveUp(equations, outcome, t);
         record(motion, k, outcome, model);
         // Rates near a singularity are too uncertain to predict from: the point before serves.
         if (outcome.state.sensitivity <= Math.max(TOO_NEAR, from.sensitivity)) {
-            [from, to] = [outcome.state, model.point(p)];
+            [from, to] = [outcome.state, spare(p)];
         }
     }
     if (outcome.status !== CONVERGED) {
@@ -242,12 +137,12 @@ function isDoubtful({ status, state, isExhausted }) {
     return !isExhausted && (status !== CONVERGED || state.sensitivity > TOO_NEAR);
 }
 
-/* The march by the equations measured where the motion has come to, if they are others there: exp(-x)
-   is not nearly singular at x = 20, it is small. */
-function measuredAgain({ equations, iterations }, { q, t }) {
+/* The equations measured where the motion has come to, if they are others there: exp(-x) is not
+   nearly singular at x = 20, it is small. */
+function measuredAgain(equations, { q, t }) {
     const fresh = new Problem(equations.model, equations.p, q, t);
     const isOther = (now, i) => now < equations.magnitude[i] / OTHER_SIZE || now > equations.magnitude[i] * OTHER_SIZE;
-    return fresh.magnitude.some(isOther) && Object.assign(new March(fresh), { isDense: true, iterations });
+    return fresh.magnitude.some(isOther) && fresh;
 }
 
 /* Assemble the mechanism at the first time. */
@@ -258,9 +153,8 @@ function start(model, p, guess, t) {
         const status = attempt.status === NOT_CONVERGED ? NOT_ASSEMBLED : attempt.status;
         return { status, iterations, equations: rough, state: null, position: null, nearest: attempt.last };
     }
-    const march = new March(rough), at = attempt.last;
-    march.isDense = true;
-    let status = march.complete(at);
+    const at = attempt.last;
+    let status = completed(at, rough);
     // Towards a singular position Newton's method creeps, and ends a rounding error before it.
     if (status === CONVERGED && crawls(attempt.corrections) && at.sensitivity > TOO_NEAR) status = SINGULAR;
     // The guess may be rough: from here on the assembled mechanism gives the size.
@@ -304,10 +198,9 @@ function between(motion, t) {
     const { equations, t: times, q, status } = motion, { n, model } = equations;
     const order = [...times.keys()].sort((a, b) => Math.abs(times[a] - t) - Math.abs(times[b] - t));
     for (const k of order.slice(0, 2).filter(place => status[place] === CONVERGED)) {
-        const march = new March(equations), from = equations.evaluate(q.subarray(k * n, (k + 1) * n), times[k]);
-        march.isDense = true;
-        if (march.complete(from) !== CONVERGED) continue;
-        const { state, position } = march.advance(from, t, MAX_CORRECTIONS);
+        const from = equations.evaluate(q.subarray(k * n, (k + 1) * n), times[k]);
+        if (completed(from, equations) !== CONVERGED) continue;
+        const { state, position } = advance(equations, from, t);
         if (!position) continue;
         if (model.OUTPUTS.length) model.observe_at(state);
         return state;

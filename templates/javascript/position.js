@@ -78,16 +78,25 @@ class Problem {
         this.noise = new Float64Array(m);
         this.limit = new Float64Array(m).fill(Infinity);
         this.sums = new Float64Array(m);
-        this.none = new Float64Array(n);
-        // By what part of their terms equations of rates may be missed.
-        this.parts = Float64Array.from(model.EQUATIONS, name => ((model.REDUNDANT ?? []).includes(name) ? AGREEMENT : SOLVED));
         const generic = this.evaluate(this.place.map((_, k) => q[k] + this.reference[k] * this.probe[k]), t);
-        if (!allFinite(generic.Phi) || !allFinite(generic.Phi_q)) return;
-        const own = this.terms(generic, this.reference).map(rounded);
-        const here = this.terms(generic, this.reference.map((x, k) => x + this.place[k])).slice();
+        const isKnown = allFinite(generic.Phi) && allFinite(generic.Phi_q);
+        const measured = isKnown ? generic : this.evaluate(q, t);
+        const own = this.terms(measured, this.reference).map(rounded);
+        const here = this.terms(measured, this.reference.map((x, k) => x + this.place[k])).slice();
+        this.scales = this.scalesOf(own, here.map(x => ROUNDING * x));
+        if (!isKnown) return;
         this.magnitude = own;
-        this.noise = here.map(x => ROUNDING * x);
+        this.noise = this.scales.noise;
         this.limit = here.map(x => (x > 0 ? STEEP * x : Infinity));
+    }
+
+    /* By what the march judges points. */
+    scalesOf(magnitude, noise) {
+        const { model, reference, floor } = this, redundant = model.REDUNDANT ?? [];
+        // By what part of their terms equations of rates may be missed.
+        const part = model.EQUATIONS.map(name => (redundant.includes(name) ? AGREEMENT : SOLVED));
+        const here = magnitude.slice(), inverse = reference.map(x => 1 / x);
+        return { reference, inverse, magnitude, noise, here, part, tolerance: Math.max(TOLERANCE, floor) };
     }
 
     /* A point with Phi and Phi_q. */

@@ -61,7 +61,8 @@ def compare(found, event, solution):
     motion = solution.q, solution.q_dot, solution.q_ddot
     outputs = observed(code_of(module), motion, solution.t, p)
     if np.isfinite(solution.q[0]).all():
-        equations = problem(module, p, solution.q[0].copy(), solution.t[0])
+        with np.errstate(all="ignore"):  # as while it solves
+            equations = problem(module, p, solution.q[0].copy(), solution.t[0])
         scales = np.array([equations.size]), equations.magnitude, equations.noise
         for values, known in zip(found["scales"], scales, strict=True):
             np.testing.assert_allclose(values, known, rtol=1e-6)
@@ -170,6 +171,13 @@ CASES = {
     "no root": (lambda: free("none", x**2 + 1 + kc.t**2), [0.3], (0, 1, 3)),
     "not finite": (lambda: free("log", sympy.log(x) - kc.t), [-1.0], (0, 1, 3)),
     "no other side": (lambda: free("log", x * sympy.log(x) + 0.3), [0.3717418546365915], (0, 1, 3)),
+    "steeper and steeper": (
+        lambda: free("steep", sympy.tan(x) - 10 * kc.t), [0.0], (0, 1e5, 9)
+    ),
+    "larger and larger": (lambda: free("grows", x**3 - kc.t), [1e-3], (1e-9, 1, 9)),
+    "no values beside the guess": (
+        lambda: free("edge", sympy.sqrt(x - 5) - 0.3 - kc.t), [5.1], (0, 1, 9)
+    ),
     "ends": (lambda: free("ends", x - sympy.sqrt(1 - kc.t)), [1.0], (0, 2, 5)),
     "jump": (
         lambda: free("jump", x - sympy.Piecewise((0, kc.t < 0.55), (3, True))), [0.0], (0, 1, 11)

@@ -9,14 +9,14 @@ from kincompile.emitters.javascript.dialect import JAVASCRIPT
 from kincompile.emitters.lines import indented, wrapped
 from kincompile.emitters.planned_solve import explained
 from kincompile.emitters.printer import Printer
-from kincompile.emitters.solve_statements import factorization, operands, solution
+from kincompile.emitters.solve_statements import block_call, factorization, solution
 from kincompile.emitters.statements import Statements
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from kincompile.emitters.evaluators import Listing
-    from kincompile.emitters.planned_solve import BlockCall, SolveListing
+    from kincompile.emitters.planned_solve import SolveListing
     from kincompile.ir.inline import InlineProgram
     from kincompile.quantities import Quantity
 
@@ -60,8 +60,9 @@ def _kernel_of(quantity: Quantity, code: InlineProgram) -> str:
 def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     """Return the functions that factor Phi_q and that solve Phi_q x = right."""
     printer = Printer(JAVASCRIPT, listing.plan.nodes, listing.names)
-    factored = factorization(WRITE, code, listing, printer, _block_call)
-    solved = solution(WRITE, listing, printer, _block_call)
+    call = block_call(WRITE, "{}({}, [")
+    factored = factorization(WRITE, code, listing, printer, call)
+    solved = solution(WRITE, listing, printer, call)
     return [
         "",
         "// What a solve needs of Phi_q, and the determinants of its blocks.",
@@ -81,20 +82,6 @@ def _taken(*names: str) -> list[str]:
 def _function(name: str, arguments: str, first: Sequence[str], body: Sequence[str]) -> list[str]:
     lines = indented([*first, *body], 1).split("\n")
     return [f"function {name}({arguments}) {{", *lines, "}"]
-
-
-def _block_call(step: BlockCall, printer: Printer) -> list[str]:
-    """Return the call that solves a block, with the names of the unknowns, or its determinant."""
-    matrix = operands(step.matrix, printer)
-    if not step.right:
-        left = WRITE.value.format(step.names[0])
-        return [f"{left} = block_determinant({step.size}, [", *matrix, "]);"]
-    vector = f"block_of_{step.names[0]}"
-    right = operands(step.right, printer)
-    return [
-        f"const {vector} = block_solve({step.size}, [", *matrix, "], [", *right, "]);",
-        *(f"const {name} = {vector}[{k}];" for k, name in enumerate(step.names)),
-    ]  # fmt: skip
 
 
 def vectors(code: InlineProgram) -> list[str]:

@@ -6,6 +6,8 @@ It runs as a classic script in a page, which needs no server and no network, and
 from __future__ import annotations
 
 import json
+import re
+from functools import cache
 from typing import TYPE_CHECKING
 
 from kincompile import criteria, quantities
@@ -18,10 +20,12 @@ from kincompile.emitters.javascript.functions import (
     solve_functions,
     vectors,
 )
+from kincompile.emitters.javascript.march import JavaScriptSolver
 from kincompile.emitters.lines import indented, quoted, wrapped
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.templates import fill, read
+from kincompile.solver.reader import solver
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -33,23 +37,9 @@ if TYPE_CHECKING:
 
 DIALECT = JAVASCRIPT
 
-CRITERIA = (
-    "AGREEMENT", "ALLOWED_PART", "ARC_CORRECTIONS", "AROUND", "AROUND_OFFSETS", "ASTRAY", "AS_NEAR",
-    "AT_EVENT", "BEND", "BESIDE", "CONSTANT", "CORNER", "FAR", "FIRST_ARC", "FOLDED", "INVOLVED",
-    "IN_RANGE", "KINK", "LARGEST_ANGLE", "LARGE_ERROR", "LATE", "LONGEST_ARC",
-    "LONGEST_P", "MAX_ARCS", "MAX_CORRECTIONS",
-    "MAX_ITERATIONS", "MAX_SUBSTEPS", "MIRRORED", "MIRROR_STEP", "MOST_MIRRORED", "MOST_TURNED",
-    "NEARLY_SINGULAR", "NEAR_ANGLE", "NEAR_PART", "NUDGE", "OTHER_SIZE", "PATIENCE",
-    "RESIDUAL_FACTOR", "RESTARTS", "ROOT_LENGTH", "ROOT_STEPS", "ROUNDING", "SAME_POSITION",
-    "SAME_TIME", "SETTLED", "SHORTEST_ARC", "SHORTEST_STEP", "SINGULAR_SENSITIVITY",
-    "SMALLEST_PART", "SMALL_CORRECTION", "SMALL_ERROR", "SMALL_PART", "SMOOTH", "SOLVED",
-    "SPATIAL_COORDINATES", "STEEP", "STRAIGHT", "SUFFICIENT", "THROWN", "TOLERABLE_CORRECTION",
-    "TOLERANCE", "TOO_NEAR", "WILD",
-)  # fmt: skip
-"""The numbers of `criteria` that the solver judges by."""
-
-PARTS = ("linear.js", "position.js", "march.js", "events.js")
-"""The parts of the solver, in order."""
+MARCH = "march"
+PARTS = ("linear.js", "position.js", MARCH, "march.js", "events.js")
+"""The parts of the solver, in order: templates, and the march that is printed."""
 
 KEYWORDS = (
     "arguments", "await", "break", "case", "catch", "class", "const", "continue", "debugger",
@@ -111,27 +101,16 @@ def files(
     units = {item.name: item.unit for item in program.coordinates}
     units |= {item.name: item.unit for item in program.parameters}
     units |= {item.name: item.unit for item in program.outputs}
-    data = {
-        "name": program.name,
+    data = WRITE.facts(code, listing, text) | {
         "format": quantities.FORMAT,
-        "fingerprint": program.fingerprint,
-        "n": len(program.coordinates),
-        "m": len(program.equations),
-        "k": len(program.parameters),
         "lists": {name: indented(lines, 2) for name, lines in _lists(code).items()},
         "units": indented(wrapped(f'"{name}": "{unit}"' for name, unit in units.items()), 2),
         "corners": str(program.corners).lower(),
         "matrices": indented(_matrices(code), 2),
-        "header": WRITE.heading(code),
         "variable": NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(program.name),
         "tables": indented(_tables(program)),
         "table_names": ", ".join(program.tables),
-        "has_square": "square(" in text,
-        "has_blocks": listing is not None and listing.plan.has_large_blocks,
-        "functions": text,
         "vectors": indented(vectors(code), 3),
-        "n_factors": 0 if listing is None else len(listing.factors),
-        "n_blocks": 0 if listing is None else len(listing.plan.determinants),
         "solver": "" if listing is None else _solver(),
         "returned": indented(
             wrapped(
@@ -143,11 +122,15 @@ def files(
     return {f"{program.name}.js": fill("javascript/module.js.jinja", data)}
 
 
+@cache
 def _solver() -> str:
-    """Return the script that solves for the motion, with the criteria of the runtime."""
-    numbers = wrapped(f"{name} = {json.dumps(getattr(criteria, name))}" for name in CRITERIA)
+    """Return the script that solves for the motion, with the criteria that it uses."""
+    march = JavaScriptSolver(solver(is_careful=True)).text()
+    march = f"/* ---- from time to time ---- */\n\n{march}"
+    parts = "\n".join(march if x == MARCH else read(f"javascript/{x}") for x in PARTS)
+    used = set(re.findall(r"\b[A-Z_]+\b", parts)) & vars(criteria).keys()
+    numbers = wrapped(f"{name} = {json.dumps(getattr(criteria, name))}" for name in sorted(used))
     text = "\n".join(f"        {line}" for line in numbers).strip().rstrip(",")
-    parts = "\n".join(read(f"javascript/{name}") for name in PARTS)
     slots = {"criteria": text, "parts": indented(parts.rstrip().split("\n"))}
     return indented(fill("javascript/solver.js.jinja", slots).rstrip().split("\n"))
 

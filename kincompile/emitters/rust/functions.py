@@ -10,14 +10,14 @@ from kincompile.emitters.lines import indented, wrapped
 from kincompile.emitters.planned_solve import explained
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.rust.dialect import RUST
-from kincompile.emitters.solve_statements import factorization, operands, solution
+from kincompile.emitters.solve_statements import block_call, factorization, solution
 from kincompile.emitters.statements import Statements
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from kincompile.emitters.evaluators import Listing
-    from kincompile.emitters.planned_solve import BlockCall, SolveListing
+    from kincompile.emitters.planned_solve import SolveListing
     from kincompile.ir.inline import InlineProgram
     from kincompile.quantities import Quantity
 
@@ -74,10 +74,11 @@ def single(quantity: Quantity, code: InlineProgram) -> list[str]:
 def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     """Return the functions that factor Phi_q and that solve Phi_q x = right."""
     printer = Printer(RUST, listing.plan.nodes, listing.names)
-    factored = factorization(WRITE, code, listing, printer, _block_call)
+    call = block_call(WRITE, "{}::<{}>(&[")
+    factored = factorization(WRITE, code, listing, printer, call)
     solved = [
         "let mut to = [0.0; N_COORDINATES];",
-        *solution(SOLVE, listing, printer, _block_call),
+        *solution(SOLVE, listing, printer, call),
         "to",
     ]
     return [
@@ -96,20 +97,6 @@ def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
 
 def _function(head: str, body: Sequence[str]) -> list[str]:
     return [f"{head} {{", *indented(body).split("\n"), "}"]
-
-
-def _block_call(step: BlockCall, printer: Printer) -> list[str]:
-    """Return the call that solves a block, with the names of the unknowns, or its determinant."""
-    matrix = operands(step.matrix, printer)
-    if not step.right:
-        left = WRITE.value.format(step.names[0])
-        return [f"{left} = block_determinant::<{step.size}>(&[", *matrix, "]);"]
-    vector = f"block_of_{step.names[0]}"
-    right = operands(step.right, printer)
-    return [
-        f"let {vector} = block_solve::<{step.size}>(&[", *matrix, "], [", *right, "]);",
-        *(f"let {name} = {vector}[{k}];" for k, name in enumerate(step.names)),
-    ]  # fmt: skip
 
 
 def vectors(code: InlineProgram) -> tuple[list[str], list[str]]:

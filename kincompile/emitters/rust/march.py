@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import TYPE_CHECKING
 
-from kincompile.emitters.solver_printer import ATOM, CHOICE, OR, WIDTH, SolverPrinter
+from kincompile.emitters.solver_printer import ATOM, CHOICE, OR, WIDTH, OneLane
 from kincompile.solver.nodes import LANE, REAL, Call, Constant, Do, Field, For, Index, Name
 from kincompile.solver.vocabulary import KERNELS, ROOM
 
@@ -35,7 +35,7 @@ GIVEN = ("Point", "Variants")
 PUBLIC = ("march", "march_variants")
 
 
-class RustSolver(SolverPrinter):
+class RustSolver(OneLane):
     """Prints the solver as Rust."""
 
     calls: Mapping[str, str] = {  # a constant
@@ -161,9 +161,7 @@ class RustSolver(SolverPrinter):
 
     def constant(self, node: Constant) -> str:
         """Return a number or the name of one."""
-        if isinstance(node.value, bool):
-            return str(node.value).lower()
-        return SIZES.get(node.value, str(node.value))
+        return SIZES.get(node.value) or super().constant(node)
 
     @staticmethod
     def size(kind: Type) -> str:
@@ -173,22 +171,15 @@ class RustSolver(SolverPrinter):
     def leaf(self, node: Name | Field | Index) -> tuple[str, int]:
         """Return a variable, a field or an entry, without the index of the one lane."""
         match node:
-            case Name(variable):
-                return ("0" if variable in self.one else variable.name), ATOM
-            case Field(struct, name):
-                return f"{struct.variable.name}.{name}", ATOM
+            case Name(variable) if variable in self.one:
+                return "0", ATOM
             case Index(Field(owner) as array, (row, *time, point)) if "any" in array.type.dims:
                 if array.type.dims == ("any",):
                     return f"{self.expression(array)}[{self.expression(point)}]", ATOM
                 size = SIZES["K" if array.name == "p" else "N"]
                 place = self.place(owner, time, point)
                 return f"{self.expression(array)}[{place} * {size} + {self.expression(row)}]", ATOM
-            case Index(array, indices):
-                if array.type.dims[len(indices) - 1] == LANE:
-                    indices = indices[:-1]
-                text = self.expression(array)
-                return text + "".join(f"[{self.expression(x)}]" for x in indices), ATOM
-        raise TypeError(node)
+        return super().leaf(node)
 
     def place(self, owner: Name, time: Sequence[Expression], variant: Expression) -> str:
         """Return the number of a variant at a time."""
@@ -213,8 +204,8 @@ class RustSolver(SolverPrinter):
     def call(self, node: Call) -> tuple[str, int]:
         """Return a call."""
         match node.name, node.arguments:
-            case "any_lane" | "copied", (value,):
-                return self.strong(value)
+            case "any_lane" | "copied", _:
+                return super().call(node)
             case "row" | "rows", ():
                 return f"[0.0; {self.size(node.type)}]", ATOM
             case "part", (vector, first):

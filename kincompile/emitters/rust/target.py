@@ -84,22 +84,12 @@ def files(
     lines += [] if listing is None else solve_functions(code, listing)
     text = indented(lines, 0)
     fields, values = vectors(code)
-    data = {
-        "name": program.name,
+    data = WRITE.facts(code, listing, text) | {
         "header": WRITE.heading(code).replace("// ", "//! ").replace("//\n", "//!\n"),
-        "fingerprint": program.fingerprint,
-        "n": len(program.coordinates),
-        "m": len(program.equations),
-        "k": len(program.parameters),
         "constants": indented(_constants(code), 0),
         "tables": indented(_tables(program), 0),
-        "has_square": "square(" in text,
-        "has_blocks": listing is not None and listing.plan.has_large_blocks,
         "fields": indented(fields),
         "values": indented(values, 3),
-        "n_factors": 0 if listing is None else len(listing.factors),
-        "n_blocks": 0 if listing is None else len(listing.plan.determinants),
-        "functions": text,
         "march": "" if listing is None else fill("rust/march.rs.jinja", _march(program)),
     }
     return {f"{program.name}.rs": fill("rust/module.rs.jinja", data)}

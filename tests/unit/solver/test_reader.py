@@ -1,11 +1,12 @@
 """What the reader of the solver's text refuses, each at its line; and what it makes of the rest."""
 
 from importlib.resources import files
+from typing import Any
 
 import pytest
 
 from kincompile.solver.expressions import Refused
-from kincompile.solver.nodes import LANE, variables_in
+from kincompile.solver.nodes import LANE, Comment, Name, variables_in
 from kincompile.solver.reader import read, solver
 
 TEXT = (files("kincompile.solver") / "text.py").read_text(encoding="utf-8")
@@ -22,7 +23,7 @@ REFUSED = {
     ),
     "an expression that is none": ("PATTERN[e][0]\n", "[x for x in PATTERN][0]\n", "no expression"),
     "a chain of relations": ("size > o.residual", "0.0 < size > o.residual", "no expression"),
-    "an operation that is none": ("0.5 * h * b.q_ddot", "0.5 ** h * b.q_ddot", "Pow is no oper"),
+    "an operation that is none": ("+= h * (b.q_dot[i] +", "+= h ** (b.q_dot[i] +", "Pow is no"),
     "lanes said in a function of lanes": (
         "complete(b, s, o)\n    err", "complete(b, s, o, lanes=1)\n    err",
         "complete is called without lanes"
@@ -45,7 +46,7 @@ REFUSED = {
     "an index of a lane in a function of lanes": (
         "o.residual = 0.0", "o.residual[0] = 0.0", "no index of a lane"
     ),
-    "rows as one number": ("abs(b.Phi[i])", "abs(b.Phi)", "abs takes number"),
+    "rows as one number": ("size = abs(b.Phi[i])", "size = abs(b.Phi)", "abs takes number"),
     "too many indices": ("o.status[good]", "o.status[good][0]", "too many indices"),
     "a loop that goes beyond an array": (
         "1.0 if ANGULAR[i]", "1.0 if IS_REDUNDANT[i]", "goes to N, and there are M"
@@ -87,6 +88,29 @@ def test_that_a_text_is_refused_at_its_line(what):
     with pytest.raises(Refused, match=message) as refusal:
         read(before + new + after)
     assert int(str(refusal.value).partition(":")[0].removeprefix("line ")) in lines
+
+
+CHOICE = """    for i in range(N):
+        speed = abs(b.q_dot[i][0]) * s.inverse[i][0]
+        if IS_CAREFUL:
+            # The last one serves.
+            most = speed
+        else:
+            # It is the largest.
+            most = speed if speed > most else most
+"""
+
+
+def test_that_a_choice_of_march_leaves_one_branch_and_its_comments():
+    head, _, rest = TEXT.partition("    for i in range(N):\n        speed = abs(b.q_dot")
+    text = head + CHOICE + rest[rest.index("    return most") :]
+    for is_careful, comment in ((False, "It is the largest."), (True, "The last one serves.")):
+        loop: Any = read(text, is_careful=is_careful).functions["speed_of"].body[1]
+        assert loop.body[1] == Comment((comment,))
+        assert isinstance(loop.body[2].value, Name) == is_careful
+    plain, careful = solver(), solver(is_careful=True)
+    assert "advance_carefully" in careful.functions.keys() - plain.functions.keys()
+    assert "is_there" in careful.structs["Outcome"].fields.keys() - plain.structs["Outcome"].fields
 
 
 def test_that_parameters_which_a_function_changes_are_known():

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+import sympy
 
 import kincompile as kc
+from kincompile import criteria
 from kincompile.criteria import TOLERANCE
 from kincompile.emitters.c.target import KEYWORDS
 from kincompile.runtime.inputs import read_inputs
@@ -12,7 +14,7 @@ from kincompile.solver import vocabulary, words
 from kincompile.solver.nodes import variables_in
 from kincompile.solver.reader import solver
 
-from .conftest import start_of
+from .conftest import mechanism_of, start_of
 
 WIDTHS = (1, 7, 32)
 T = np.linspace(0, 1, 25)
@@ -68,6 +70,23 @@ def test_that_a_set_that_fails_rests_and_disturbs_no_other(example_named, march)
     np.testing.assert_allclose(found.q[:, :, 2], motion.q, rtol=0, atol=1e-10)
 
 
+def test_that_the_careful_march_takes_the_steps_of_the_runtime():
+    """Across a gap: after a step that was too long the next ones are no longer."""
+    model = kc.ConstraintSystem("wave", ["x"], [sympy.Symbol("x") - sympy.sin(kc.t)])
+    module = kc.compile(model)
+    text = words.on_numpy(mechanism_of(module, 1), is_careful=True)
+    b, s, o, at = text.Point(), text.Scales(), text.Outcome(), text.State()
+    at.q_dot[:] = 1.0
+    text.constants(b, lanes=1)
+    text.measure(b, 1.0, s)
+    s.tolerance = TOLERANCE
+    assert text.advance_carefully(b, s, at, 0.0, 300.0, o)
+    assert (o.status[0], o.is_there[0]) == (Status.CONVERGED, True)
+    assert b.q[0, 0] == pytest.approx(np.sin(300.0), abs=1e-12)
+    expected = kc.solve(module, [0, 300.0], guess=[0]).iterations[1]
+    assert o.iterations[0] == pytest.approx(expected, rel=0.03)
+
+
 def native_march(native, t, p):
     """Follow a motion by compiled C, from the start that the text has too."""
     inputs = read_inputs(native, t, p, None, TOLERANCE, 25)
@@ -98,10 +117,9 @@ def test_that_printed_c_does_what_the_text_does(example_named, march, factor):
 
 
 def test_that_every_name_of_the_language_has_a_meaning_on_numpy():
-    counts = {*vocabulary.COUNTS, *vocabulary.START_COUNTS}
-    known = {*vocabulary.CONSTANTS, *vocabulary.WORDS} - counts
+    known = {*vocabulary.CONSTANTS, *vocabulary.WORDS}
     words_of_python = {"abs", "max", "min"}
-    here = {*vars(words), *vocabulary.CRITERIA, *vocabulary.START_CRITERIA, *words_of_python}
+    here = {*vars(words), *vars(criteria), *words_of_python}
     assert known - here == set()
 
 
