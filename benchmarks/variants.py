@@ -7,6 +7,7 @@ chunk, hands the motion on, and forgets it; memory does not depend on the number
 from __future__ import annotations
 
 import json
+import math
 import resource
 import sys
 from time import process_time
@@ -35,7 +36,10 @@ SPREAD = 0.02
 STOPPED = 1000
 """Sets of each kind that are compared with those that move."""
 
-PROCESSES = 3
+ROCKER = 22.0, 14.0, 14.0, 20.0
+"""Lengths of a four-bar whose crank cannot turn."""
+
+PROCESSES, STOPS = 3, 7
 AGREEMENT = 1e-8
 NUMPY, C, PLAIN = "kincompile, NumPy", "kincompile, C", "plain C, started from a prediction"
 
@@ -155,22 +159,44 @@ def reached(found: dict[str, tuple[Timing, ...]]) -> Iterator[Target]:
 
 def stopped() -> Iterator[Target]:
     """Compare sets that lock up, or cannot be assembled, with sets that move."""
-    t, moving = FOUR_BAR.times(50), next(chunks(STOPPED))
-    ends = {"locks up": (3, 2.5), "cannot be assembled": (0, 2.0)}  # longer by so much
     for target in ("numpy", "c"):
         module = kc.compile(FOUR_BAR.mechanism(), target)
-
-        def seconds(p: Vector, module: ModuleType = module) -> float:
-            start = process_time()
-            kc.solve(module, t, p[:, np.newaxis])
-            return process_time() - start
-
-        least = min(seconds(moving) for _ in range(PROCESSES))
-        for what, (place, factor) in ends.items():
-            p = moving.copy()
-            p[:, place] *= factor
-            ratio = min(seconds(p) for _ in range(PROCESSES)) / least
+        for what, t, moving, sets in kinds():
+            runs = [(_timed(module, t, moving), _timed(module, t, sets)) for _ in range(STOPS)]
+            least, most = (min(run[k][0] for run in runs) / STOPPED for k in range(2))
+            part = runs[0][1][1]
+            ratio = (most - (1 - part) * least) / part / least
             yield Target(f"{target}: a set that {what} / one that moves", ratio, "at most", 10, "x")
+
+
+def kinds() -> Iterator[tuple[str, Vector, Vector, Vector]]:
+    """Give what stops sets, times, sets that move and sets of which some or all are stopped."""
+    t, moving, every, other = (
+        FOUR_BAR.times(50),
+        next(chunks(STOPPED)),
+        slice(None),
+        slice(1, None, 2),
+    )
+    for what, place, factor, some in (
+        ("locks up", 3, 2.5, every),
+        ("cannot be assembled", 0, 2.0, every),
+        ("cannot be assembled, beside as many that move", 0, 2.0, other),
+        ("locks up, beside as many that move", 3, 2.5, other),
+        ("locks up beyond a gap, beside as many that move", 0, 3.0, other),
+    ):
+        p = moving.copy()
+        p[some, place] *= factor
+        yield what, t, moving, p
+    angles = 0.3 + np.linspace((0, 0), (0.2, math.tau), STOPPED)  # of the crank, at t = 1
+    few, turn = (np.array([(*ROCKER, angle) for angle in column]) for column in angles.T)
+    yield "is out of reach, over all angles of a crank", np.linspace(1, 1.02, 50), few, turn
+
+
+def _timed(module: ModuleType, t: Vector, p: Vector) -> tuple[float, float]:
+    """Return processor time [s], and which part of the sets stops."""
+    start = process_time()
+    solution = kc.solve(module, t, p[:, np.newaxis])
+    return process_time() - start, float((~solution.good).any(axis=1).mean())
 
 
 def _peak() -> float:

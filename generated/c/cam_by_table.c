@@ -1209,7 +1209,7 @@ static void record(const cam_by_table_variants *m, strip *b, const outcome *o, s
     }
 }
 
-// Assemble variants from the guess, at the first time.
+// Assemble variants from their guesses, at the first time.
 static void assemble(const cam_by_table_variants *m, strip *b, scales *s, size_t first,
     size_t count, outcome *o)
 {
@@ -1218,11 +1218,13 @@ static void assemble(const cam_by_table_variants *m, strip *b, scales *s, size_t
     for (int i = 0; i < K; i++)
         for (size_t k = 0; k < count; k++)
             b->p[i][k] = m->p.first[i * m->p.entry + (ptrdiff_t)(first + k) * m->p.point];
+    for (int i = 0; i < N; i++)
+        for (size_t k = 0; k < count; k++)
+            b->q[i][k] = m->guess.first[i * m->guess.entry
+                    + (ptrdiff_t)(first + k) * m->guess.point];
     for (size_t k = 0; k < count; k++) {
         b->t[k] = m->t[0];
         o->is_over[k] = 0;
-        for (int i = 0; i < N; i++)
-            b->q[i][k] = m->guess[i];
     }
     measure(b, m->size, s, count);
     correct(b, s, m->max_iterations, o, count);
@@ -1279,7 +1281,8 @@ static size_t march(const cam_by_table_variants *m)
 }
 
 // Let the variants that failed at a time rest at the guess, where they disturb no others.
-static void put_to_rest(const cam_by_table_variants *m, strip *b, outcome *o, size_t count)
+static void put_to_rest(const cam_by_table_variants *m, strip *b, outcome *o, size_t first,
+    size_t count)
 {
     for (size_t k = 0; k < count; k++) {
         if (o->is_over[k])
@@ -1287,7 +1290,8 @@ static void put_to_rest(const cam_by_table_variants *m, strip *b, outcome *o, si
         if (o->status[k] != CAM_BY_TABLE_CONVERGED) {
             o->is_over[k] = 1;
             for (int i = 0; i < N; i++) {
-                b->q[i][k] = m->guess[i];
+                b->q[i][k] = m->guess.first[i * m->guess.entry
+                        + (ptrdiff_t)(first + k) * m->guess.point];
                 b->q_dot[i][k] = 0.0;
                 b->q_ddot[i][k] = 0.0;
             }
@@ -1307,7 +1311,7 @@ size_t cam_by_table_march_variants(const cam_by_table_variants *m)
     for (size_t first = 0; first < m->variants; first += LANES) {
         const size_t count = m->variants - first < LANES ? m->variants - first : LANES;
         assemble(m, &b, &s, first, count, &o);
-        put_to_rest(m, &b, &o, count);
+        put_to_rest(m, &b, &o, first, count);
         record(m, &b, &o, 0, first, count);
         for (size_t time = 1; time < m->count; time++) {
             keep(&before, &b);
@@ -1320,7 +1324,7 @@ size_t cam_by_table_march_variants(const cam_by_table_variants *m)
                     take_up(&at, &before, k);
                     advance(&b, &s, &at, m->t[time], k, &o);
                 }
-            put_to_rest(m, &b, &o, count);
+            put_to_rest(m, &b, &o, first, count);
             record(m, &b, &o, time, first, count);
         }
         for (size_t k = 0; k < count; k++)
@@ -1333,8 +1337,8 @@ size_t cam_by_table_march_variants(const cam_by_table_variants *m)
 size_t cam_by_table_march(const cam_by_table_motion *motion)
 {
     const cam_by_table_variants m = {
-        .count = motion->count, .t = motion->t, .p = { motion->p, 1, 0 }, .guess = motion->guess,
-        .size = motion->size, .tolerance = motion->tolerance,
+        .count = motion->count, .t = motion->t, .p = { motion->p, 1, 0 },
+        .guess = { motion->guess, 1, 0 }, .size = motion->size, .tolerance = motion->tolerance,
         .max_iterations = motion->max_iterations,
         .q = motion->q, .q_dot = motion->q_dot, .q_ddot = motion->q_ddot,
         .residual = motion->residual, .status = motion->status, .iterations = motion->iterations,

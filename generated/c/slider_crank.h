@@ -109,15 +109,15 @@ typedef struct {
 // Follow a motion; returns how many points converged, from the first one on.
 size_t slider_crank_march(const slider_crank_motion *motion);
 
-// The motions of many variants, each with parameters of its own. Of q, q_dot and q_ddot, entry i of
-// variant v at time j is first[i * entry + v * point + j * time]; of residual, status and
-// iterations it is [j * variants + v]. A variant that fails has the status at that time, is not
-// reached at later ones, and disturbs no other.
+// The motions of many variants, each with parameters and a guess of its own. Of q, q_dot and
+// q_ddot, entry i of variant v at time j is first[i * entry + v * point + j * time]; of residual,
+// status and iterations it is [j * variants + v]. A variant that fails has the status at that time,
+// is not reached at later ones, and disturbs no other.
 typedef struct {
     size_t count, variants;
-    const double *t;      // count times
-    slider_crank_input p;  // 0 parameters a variant
-    const double *guess;  // 9 coordinates
+    const double *t;         // count times
+    slider_crank_input p;      // 0 parameters a variant
+    slider_crank_input guess;  // 9 coordinates a variant; one for all where point is 0
     double size, tolerance;
     int max_iterations;
     slider_crank_output q, q_dot, q_ddot;

@@ -457,7 +457,8 @@ const LANES: usize = 1;
 /// Newton starts from the guess, without safeguards: it should be near an assembled position. It
 /// stops when a correction, of lengths in sizes of the mechanism, is at most the tolerance. Entry i
 /// of variant v at time j is `q[(j * variants + v) * N_COORDINATES + i]`; of status and the like it
-/// is `status[j * variants + v]`. Parameter i of variant v is `p[v * N_PARAMETERS + i]`.
+/// is `status[j * variants + v]`. Parameter i of variant v is `p[v * N_PARAMETERS + i]`, and
+/// coordinate i of its guess is `guess[v * N_COORDINATES + i]`.
 pub struct Variants<'a> {
     pub count: usize,
     pub variants: usize,
@@ -1667,18 +1668,18 @@ fn record(m: &mut Variants, b: &Point, o: &Outcome, time: usize, first: usize, c
     }
 }
 
-/// Assemble variants from the guess, at the first time.
+/// Assemble variants from their guesses, at the first time.
 fn assemble(m: &Variants, b: &mut Point, s: &mut Scales, first: usize, count: usize, o: &mut
     Outcome) {
     s.tolerance = m.tolerance;
     for i in 0..N_PARAMETERS {
         b.p[i] = m.p[first * N_PARAMETERS + i];
     }
+    for i in 0..N_COORDINATES {
+        b.q[i] = m.guess[first * N_COORDINATES + i];
+    }
     b.t = m.t[0];
     o.is_over = false;
-    for i in 0..N_COORDINATES {
-        b.q[i] = m.guess[i];
-    }
     measure(b, m.size, s);
     correct(b, s, m.max_iterations, o);
     complete(b, s, o);
@@ -1736,14 +1737,14 @@ pub fn march(m: &mut Variants) -> usize {
 }
 
 /// Let the variants that failed at a time rest at the guess, where they disturb no others.
-fn put_to_rest(m: &Variants, b: &mut Point, o: &mut Outcome, count: usize) {
+fn put_to_rest(m: &Variants, b: &mut Point, o: &mut Outcome, first: usize, count: usize) {
     if o.is_over {
         o.status = NOT_REACHED;
     }
     if o.status != CONVERGED {
         o.is_over = true;
         for i in 0..N_COORDINATES {
-            b.q[i] = m.guess[i];
+            b.q[i] = m.guess[first * N_COORDINATES + i];
             b.q_dot[i] = 0.0;
             b.q_ddot[i] = 0.0;
         }
@@ -1761,7 +1762,7 @@ pub fn march_variants(m: &mut Variants) -> usize {
     for first in (0..m.variants).step_by(LANES) {
         let count = (m.variants - first).min(LANES);
         assemble(m, &mut b, &mut s, first, count, &mut o);
-        put_to_rest(m, &mut b, &mut o, count);
+        put_to_rest(m, &mut b, &mut o, first, count);
         record(m, &b, &o, 0, first, count);
         for time in 1..m.count {
             before.clone_from(&b);
@@ -1771,7 +1772,7 @@ pub fn march_variants(m: &mut Variants) -> usize {
                 take_up(&mut at, &before);
                 advance(&mut b, &s, &mut at, m.t[time], 0, &mut o);
             }
-            put_to_rest(m, &mut b, &mut o, count);
+            put_to_rest(m, &mut b, &mut o, first, count);
             record(m, &b, &o, time, first, count);
         }
         if !o.is_over {

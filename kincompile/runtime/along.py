@@ -100,18 +100,20 @@ def lead_together(
         return March(equations, engine, inputs.tolerance)
 
     march = march_of(left)
-    state, _ = march.complete(march.engine.evaluate(q, way))
+    begun, _ = march.complete(march.engine.evaluate(q, way))
+    state = begun
     for _ in range(MOST_PARTS):
         to = np.minimum(way[left] + part[left], 1.0)
         following, good, _ = march.step_together(state, to, MAX_CORRECTIONS)
         state = chosen(good, following, state)
         q[:, left], way[left] = state.point.q, state.t
         part[left] = march.pace(state, 1.0, part[left], good, SMALLEST_PART)
-        on = (way[left] < 1) & (part[left] > SMALLEST_PART)
+        locked = march.lock_up(begun, state, 1.0, SMALLEST_PART)
+        on = (way[left] < 1) & (part[left] > SMALLEST_PART) & ~locked
         if not on.any():
             break
         if not on.all():
-            left, state = left[on], some_of(state, on)
+            left, state, begun = left[on], some_of(state, on), some_of(begun, on)
             march = march_of(left)
     reached, crosses = way == 1, np.zeros(len(sets), dtype=bool)
     lost = np.flatnonzero(~reached & (way > 0))

@@ -45,15 +45,20 @@ def safeguarded(
     has a planned solve.
     """
     pattern, times = _pattern_of(equations.code), np.broadcast_to(t, len(sets))
-    found, left = np.full_like(guesses.T, np.nan), np.arange(len(sets))
+    found, (first, *others) = np.full_like(guesses.T, np.nan), begins(equations, guesses)
     most = max(1, MOST_NUMBERS // equations.place.size**2)
-    for begin in begins(equations, guesses):
-        for own in [left[k : k + most] for k in range(0, left.size, most)]:
-            q = begin[own].T.copy()
-            attempts = _Attempts(equations, pattern, sets[own].T.copy(), times[own], q)
-            far = attempts.miss(q, max_iterations)
-            found[:, own[~far]] = q[:, ~far]
+    for some in ([first], others):
         left = np.flatnonzero(np.isnan(found[0]))
+        own = np.tile(left, len(some))
+        q = np.concatenate([begin[left] for begin in some]).T
+        for part in [slice(k, k + most) for k in range(0, own.size, most)]:
+            here, sets_here = q[:, part].copy(), sets[own[part]].T.copy()
+            attempts = _Attempts(equations, pattern, sets_here, times[own[part]], here)
+            here[:, attempts.miss(here, max_iterations)] = np.nan
+            q[:, part] = here
+        for reached in reversed(np.split(q, len(some), axis=1)):  # the first one counts
+            near = np.isfinite(reached[0])
+            found[:, left[near]] = reached[:, near]
     return found
 
 

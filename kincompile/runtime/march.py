@@ -276,7 +276,7 @@ class March:
         is_far = following.sensitivity <= TOO_NEAR
         return following, all_hold(found.good & near & is_far, checks), found.iterations
 
-    def lock_up(self, begin: State, state: State, t: Array, smallest: Array) -> Any:
+    def lock_up(self, begin: State, state: State, t: Any, smallest: Any) -> Any:
         """Say of a batch that cannot be taken on by its smallest step where it is at a lock-up.
 
         There velocities grow as one over the root of the time that is left: they have grown since
@@ -286,9 +286,11 @@ class March:
         speed, left = self.until_lock_up(state, forward)
         grown = speed >= GROWN * self.equations.extent(begin.q_dot)
         before = np.abs(forward) - left > BEFORE_LOCK_UP * np.abs(t - begin.t)
-        there = self.engine.evaluate(state.point.q, t).Phi
-        finite = np.isfinite(sum(row for row in there) + np.zeros(speed.shape))
-        return (left <= LEFT * smallest) & grown & before & finite
+        ends = (left <= LEFT * smallest) & grown & before
+        if ends.any():
+            there = self.engine.evaluate(state.point.q, t).Phi
+            ends &= np.isfinite(sum(row for row in there) + np.zeros(speed.shape))
+        return ends
 
     def bifurcation(self, state: State, t: Any, smallest: Array) -> Any:
         """Say of a batch that cannot be taken on by its smallest step where it is at a bifurcation.

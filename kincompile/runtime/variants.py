@@ -14,17 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import (
-    FOLDED,
-    LARGE_ERROR,
     MAX_CORRECTIONS,
     MAX_SUBSTEPS,
-    SETTLED,
     SMALLEST_PART,
     TOO_NEAR,
 )
 from kincompile.errors import BranchSwitchWarning, memory_for
-from kincompile.runtime.along import lead, lead_together
-from kincompile.runtime.attempts import other_sides, safeguarded
+from kincompile.runtime.assembled import Begin, Sets, first_position, followed
+from kincompile.runtime.attempts import safeguarded
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.follow import follow
 from kincompile.runtime.march import (
@@ -38,10 +35,9 @@ from kincompile.runtime.march import (
     put,
     some_of,
 )
-from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.singular.events import locate, status_after
-from kincompile.runtime.start import give_up, start, turned_guesses
+from kincompile.runtime.start import give_up, start
 from kincompile.runtime.status import Status
 from kincompile.tables import counted
 
@@ -53,11 +49,11 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.follow import Motion, Progress
     from kincompile.runtime.inputs import Inputs
-    from kincompile.runtime.problem import Problem
     from kincompile.runtime.singular.events import Event
 
     Mask = NDArray[np.bool_]
     Places = NDArray[np.intp]
+    Statuses = NDArray[np.intc]
     _Lost = tuple[int, int, March, State, Outcome]
     """A variant, its next time, its march, where it came from, and how far it got."""
 
@@ -116,10 +112,10 @@ def solve_variants(inputs: Inputs, sets: Array, progress: Progress | None) -> So
     the solution have shape (B, N, n), and there is a status per variant and point.
     """
     count, arrays = len(sets), _Arrays.over(inputs, len(sets))
-    inputs, begin = _first_position(inputs)
+    inputs, begin = first_position(inputs)
     for first in range(0, count, CHUNK):
         chunk = slice(first, min(first + CHUNK, count))
-        _solve_chunk(inputs, begin, sets[chunk], arrays, chunk)
+        _Chunk(inputs, begin, sets[chunk], arrays, chunk).solve()
         if progress:
             progress(chunk.stop, count)
     if inputs.smooth:
@@ -158,10 +154,10 @@ def _warn_of(inputs: Inputs, passed: Mapping[int, Event]) -> None:
 def solve_in_turn(inputs: Inputs, sets: Array, progress: Progress | None) -> Solution:
     """Solve variants of a module that has no lanes, one after the other."""
     arrays = _Arrays.over(inputs, len(sets))
-    inputs, begin = _first_position(inputs)
+    inputs, begin = first_position(inputs)
     passed: dict[int, Event] = {}
     for variant, p in enumerate(sets):
-        motion = _followed(inputs, begin, p)
+        motion = followed(inputs, begin, p)
         arrays.put(motion, variant)
         if motion.passed:
             passed[variant] = motion.passed[0]
@@ -171,135 +167,69 @@ def solve_in_turn(inputs: Inputs, sets: Array, progress: Progress | None) -> Sol
     return _solution(inputs, sets, arrays)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Begin:
-    """Where all sets start from: a position with the parameters of the inputs."""
-
-    equations: Problem
-    q: Array  # (n,): assembled, or the guess
-    is_assembled: bool  # whether other sets can follow from there
-
-
-def _first_position(inputs: Inputs) -> tuple[Inputs, _Begin]:
-    """Assemble the mechanism with the first set, or else with the parameters of the model.
-
-    It is found with care, and all sets are to be on its branch. Returns the inputs with those
-    parameters and that position as the guess, as a chunk of a sweep has them.
-    """
-    time = float(inputs.t[0])
-    for p in (inputs.p, np.array(inputs.code.module.DEFAULTS, dtype=np.float64)):
-        own = replace(inputs, p=p)
-        equations = problem(inputs.code.module, p, inputs.guess, time)
-        march = March(equations, equations.engine, inputs.tolerance)
-        together = own.code.lanes is not None
-        outcome = start(march, time, own, is_in_vain=together)
-        if together and outcome.status is Status.NOT_ASSEMBLED:  # by Newton's own steps
-            here = p[np.newaxis], time, own.guess[np.newaxis]
-            if not np.isnan(safeguarded(equations, *here, own.max_iterations)).any():
-                outcome = start(march, time, own)
-        found = outcome.state
-        if found is not None and found.sensitivity <= TOO_NEAR:
-            begin = found.point.q
-            return replace(own, guess=begin), _Begin(equations, begin, is_assembled=True)
-    equations = problem(inputs.code.module, inputs.p, inputs.guess, time)
-    return inputs, _Begin(equations, inputs.guess, is_assembled=False)
-
-
-def _followed(inputs: Inputs, begin: _Begin, p: Array) -> Motion:
-    """Follow the motion of one set, from the branch on which all of them are to be."""
-    own = replace(inputs, p=p)
-    if not begin.is_assembled:
-        return follow(own)[0]
-    motion, _ = follow(replace(own, guess=begin.q))
-    equations, q = begin.equations, motion.q[0]
-    is_there = motion.status[0] == Status.CONVERGED
-    if not is_there or not (_is_elsewhere(equations, q, begin.q) or _leaves(begin, own, q)):
-        return motion
-    led, crosses = lead(inputs, equations, begin.q, p)
-    motion, _ = follow(own if led is None else replace(own, guess=led))
-    is_there = motion.status[0] == Status.CONVERGED
-    if led is None and is_there and (crosses or _leaves(begin, own, motion.q[0])):
-        for values in (motion.q, motion.q_dot, motion.q_ddot):
-            values[:] = np.nan
-        motion.status[:] = Status.NOT_REACHED
-        motion.status[0] = Status.NOT_CONVERGED
-    return motion
-
-
-def _is_elsewhere(equations: Problem, q: Array, begin: Array) -> Any:
-    """Say whether a position, or each of a batch, is not as near as what is assembled beside it."""
-    return equations.is_far(q, begin) | equations.is_turned(q, begin)
-
-
-def _leaves(begin: _Begin, own: Inputs, q: Array) -> bool:
-    """Say whether a position of a set is on another branch than all start from."""
-    t = float(own.t[0])
-    there, here = begin.equations.at(begin.q, t), problem(own.code.module, own.p, q, t)
-    found = here.at(q, t)
-    if there is None or found is None:
-        return True
-    return here.engine.signs(found) != begin.equations.engine.signs(there)
-
-
-def _solve_chunk(inputs: Inputs, begin: _Begin, sets: Array, arrays: _Arrays, chunk: slice) -> None:
-    """Solve some of the variants: compiled, where the module can, and with care those that fail."""
-    march, together = inputs.code.march_variants, _Chunk(inputs, begin, sets, arrays, chunk)
-    if march is None:
-        together.run()
-        return
-    residual = np.empty((inputs.t.size, len(sets)))
-    status, iterations = np.empty((2, *residual.shape), dtype=np.intc)
-    near, motion = replace(inputs, guess=begin.q), arrays.motion[..., chunk]
-    march(near, *together.scales, sets, motion, residual, status, iterations)
-    arrays.residual[:, chunk] = residual
-    arrays.status[:, chunk], arrays.iterations[:, chunk] = status, iterations
-    elsewhere = (status[0] != Status.CONVERGED) | together.strays(motion[0, 0])
-    # What ends at a lock-up is no failure of the compiled march.
-    is_odd = status.any(axis=0) & ~(status == Status.LOCK_UP).any(axis=0)
-    together.go_on(np.flatnonzero(is_odd & ~elsewhere))
-    if elsewhere.any():
-        places = chunk.start + np.flatnonzero(elsewhere)
-        arrays.clear(places)
-        _Chunk(inputs, begin, sets[elsewhere], arrays, places).run()
-
-
 class _Chunk:
     """Variants that are solved together, and alone for the steps that are out of the ordinary."""
 
     def __init__(
-        self, inputs: Inputs, begin: _Begin, sets: Array, arrays: _Arrays, own: slice | Places
+        self, inputs: Inputs, begin: Begin, sets: Array, arrays: _Arrays, own: slice | Places
     ) -> None:
-        self._inputs, self._sets, self._arrays, self._own = inputs, sets, arrays, own
+        self._inputs, self._begin, self._p = inputs, begin, sets
+        self._sets, self._arrays, self._own = Sets(inputs, begin, sets), arrays, own
         self._places = np.arange(arrays.status.shape[1])[own]  # where variants are in the arrays
-        self._begin, self._place = begin, begin.q[:, np.newaxis]
         self._times: list[float] = inputs.t.tolist()
-        engine = Planned(inputs.code, np.ascontiguousarray(sets.T))
-        self._march = March(begin.equations, engine, inputs.tolerance)
-        self.scales = self._march.scales
 
-    def strays(self, q: Array) -> Mask:
-        """Say which variants (n, B) may have been assembled in another way than the first one."""
-        equations, begin = self._march.equations, self._place
-        found: Mask = _is_elsewhere(equations, q, begin)
-        unsettled = np.flatnonzero(~found & (equations.away(q, begin) > SETTLED))
-        if unsettled.size:
-            found[unsettled] = self._leave(unsettled, q[:, unsettled])
-        return found
+    def solve(self) -> None:
+        """Solve: compiled, where the module can, and with care what fails."""
+        if self._inputs.code.march_variants is None:
+            self._follow(self._assembled())
+            return
+        everyone = np.arange(len(self._p))
+        status, q = self._marched(everyone, self._begin.q)
+        elsewhere = (status[0] != Status.CONVERGED) | self._sets.strays(everyone, q)
+        self._go_on(status, everyone, ~elsewhere)
+        if elsewhere.any():
+            own = self._inputs, self._begin, self._p[elsewhere], self._arrays
+            rest = _Chunk(*own, self._places[elsewhere])
+            rest._solve_from_own_places(status[0, elsewhere])
 
-    def _leave(self, variants: NDArray[np.intp], q: Array) -> Mask:
-        """Say which variants are at positions (n, V) on another branch than all start from."""
-        p = np.vstack((self._sets[variants], self._inputs.p))
-        engine = Planned(self._inputs.code, np.ascontiguousarray(p.T))
-        point = engine.evaluate(np.column_stack((q, self._begin.q)), self._times[0])
-        found = engine.determinants(point)
-        here, shown = found[:, :-1], found[:, -1:]
-        folded = np.abs(shown) <= FOLDED * np.abs(here)  # then nothing shows a branch
-        return np.asarray(((np.sign(here) != np.sign(shown)) & ~folded).any(axis=0))
+    def _solve_from_own_places(self, status: Statuses) -> None:
+        """Solve compiled what is not on the branch from the first position, but from its own."""
+        lanes = self._assembled(status)
+        if not lanes.variants.size:
+            return
+        found, _ = self._marched(lanes.variants, lanes.state.point.q)
+        good = found[0] == Status.CONVERGED
+        self._go_on(found, lanes.variants, good)
+        if not good.all():
+            lanes = lanes.some(~good)
+            first = _Lanes(lanes.variants, lanes.index - 1, lanes.state)
+            self._record(first, lanes.state, np.ones(lanes.variants.size, bool), 0 * lanes.index)
+            self._follow(lanes)
 
-    def run(self) -> None:
-        """Go through the grid with all variants."""
-        lanes, lost = self._assembled(), list[_Lanes]()
-        march = self._march_of(lanes.variants)
+    def _marched(self, variants: Places, guess: Array) -> tuple[Statuses, Array]:
+        """Let the compiled march follow variants from a guess, or from one of each (n, V).
+
+        Returns what became of them, `Status` (N, V), and their first positions (n, V).
+        """
+        march, arrays, places = self._inputs.code.march_variants, self._arrays, self._places
+        assert march is not None
+        is_all = variants.size == places.size and isinstance(self._own, slice)
+        own = self._own if is_all else places[variants]
+        residual = np.empty((self._inputs.t.size, variants.size))
+        status, iterations = np.empty((2, *residual.shape), dtype=np.intc)
+        shape = (*arrays.motion.shape[:-1], variants.size)
+        motion = arrays.motion[..., own] if is_all else np.empty(shape)
+        scales, p = self._sets.march(variants).scales, self._p[variants]
+        march(self._inputs, guess, *scales, p, motion, residual, status, iterations)
+        if not is_all:
+            arrays.motion[..., own] = motion
+        arrays.residual[:, own], arrays.status[:, own] = residual, status
+        arrays.iterations[:, own] = iterations
+        return status, motion[0, 0]
+
+    def _follow(self, lanes: _Lanes) -> None:
+        """Go through the grid with variants that are assembled."""
+        march, lost = self._sets.march(lanes.variants), list[_Lanes]()
         for k, t in enumerate(self._times[1:] if lanes.variants.size else (), start=1):
             following, good, iterations = march.step_together(lanes.state, t, MAX_CORRECTIONS)
             self._record(lanes, following, good, iterations)
@@ -308,19 +238,20 @@ class _Chunk:
                 lost.append(here.some(~good))
                 self._arrays.motion[:, k:, :, self._places[lost[-1].variants]] = np.nan
                 lanes = lanes.some(good)
-                march = self._march_of(lanes.variants)
+                march = self._sets.march(lanes.variants)
                 if not lanes.variants.size:
                     break
         self._finish(lost)
 
-    def go_on(self, variants: Places) -> None:
-        """Take variants on from where another march has left them."""
-        if not variants.size:
+    def _go_on(self, status: Statuses, variants: Places, which: Mask) -> None:
+        """Take some variants on from where the compiled march has left them, by `Status` (N, V)."""
+        # What ends at a lock-up is no failure of that march.
+        failed = status.any(axis=0) & ~(status == Status.LOCK_UP).any(axis=0) & which
+        if not failed.any():
             return
-        arrays, places = self._arrays, self._places[variants]
-        index: Places = (arrays.status[:, places] != Status.CONVERGED).argmax(axis=0)
-        q = np.ascontiguousarray(arrays.motion[0, index - 1, :, places].T)
-        march = self._march_of(variants)
+        variants, index = variants[failed], (status[:, failed] != 0).argmax(axis=0)
+        q = np.ascontiguousarray(self._arrays.motion[0, index - 1, :, self._places[variants]].T)
+        march = self._sets.march(variants)
         state, _ = march.complete(march.engine.evaluate(q, np.array(self._times)[index - 1]))
         self._finish([_Lanes(variants, index, state)])
 
@@ -329,97 +260,39 @@ class _Chunk:
         while lost:
             lost = self._with_care(self._at_own_pace(_joined(lost)))
 
-    def _assembled(self) -> _Lanes:
-        """Assemble all variants at the first time; return those that are."""
-        inputs, time = self._inputs, self._times[0]
-        begin = np.repeat(self._place, len(self._sets), axis=1)
-        found = self._march.correct_together(begin, time, inputs.max_iterations)
-        point, on_branch = found.point, found.good & ~self.strays(found.point.q)
-        lost, crosses = np.flatnonzero(~on_branch), np.zeros(len(self._sets), dtype=bool)
-        if lost.size and self._begin.is_assembled:
-            led = lead_together(inputs, self._march.equations, self._begin.q, self._sets[lost])
-            q, on_branch[lost], crosses[lost] = led
-            point.q[:, lost[on_branch[lost]]] = q[:, on_branch[lost]]
-            point = self._march.engine.evaluate(point.q, time)
-        left, hopeless = np.flatnonzero(~on_branch), np.zeros(0, dtype=np.intp)
-        if left.size:
-            q, follows, is_assembled, vain = self._from_the_guess(left, found.good[left])
-            on_branch[left] = follows & ~crosses[left]
-            point.q[:, left[on_branch[left]]] = q[:, on_branch[left]]
-            point = self._march.engine.evaluate(point.q, time)
-            hopeless, left = left[vain], left[is_assembled & ~on_branch[left]]
-        state, checks = self._march.complete(point)
-        good = all_hold(on_branch, checks)
+    def _assembled(self, known: Statuses | None = None) -> _Lanes:
+        """Assemble all variants at the first time; return those that are.
+
+        Known may be what the compiled march said of them, as for `Sets.assembled`; of those that
+        failed there it has left no numbers.
+        """
+        inputs, everyone = self._inputs, np.arange(len(self._p))
+        begun = self._sets.assembled(known)
+        state, checks = self._sets.march().complete(begun.point)
+        good = all_hold(begun.on_branch, checks)
         good &= state.sensitivity <= TOO_NEAR
-        everyone = np.arange(len(self._sets))
-        self._record(_Lanes(everyone, 0 * everyone, state), state, good, found.iterations)
-        self._arrays.motion[..., self._places[~good]] = np.nan
-        for over, status in ((hopeless, Status.NOT_ASSEMBLED), (left, Status.NOT_CONVERGED)):
-            self._arrays.status[0, self._places[over]] = status
-        bad = np.setdiff1d(np.flatnonzero(~good), np.union1d(left, hopeless))
+        self._record(_Lanes(everyone, 0 * everyone, state), state, good, begun.iterations)
+        written = ~good if known is None else ~good & (known == Status.CONVERGED)
+        self._arrays.clear(self._places[written])
+        self._arrays.iterations[0, self._places[~good]] = 0
+        over = ((begun.hopeless, Status.NOT_ASSEMBLED), (begun.left, Status.NOT_CONVERGED))
+        for variants, status in over:
+            self._arrays.status[0, self._places[variants]] = status
+        bad = np.setdiff1d(np.flatnonzero(~good), np.union1d(begun.left, begun.hopeless))
         for variant in bad.tolist():
-            own = replace(inputs, p=self._sets[variant])
-            outcome = start(self._alone(variant, inputs.guess), time, own)
+            own = replace(inputs, p=self._p[variant])
+            outcome = start(self._sets.alone(variant, inputs.guess), self._times[0], own)
             if self._begin.is_assembled and outcome.state is not None:
                 place = outcome.state.point.q[:, np.newaxis]
                 is_known = not inputs.code.redundant  # these have no determinants
-                if crosses[variant] or (is_known and self._leave(np.array([variant]), place)[0]):
+                leaves = is_known and self._sets.leave(np.array([variant]), place)[0]
+                if begun.crosses[variant] or leaves:
                     outcome = Outcome(Status.NOT_CONVERGED, outcome.iterations, None)
             alone = self._take(0, variant, outcome)
             if alone is not None:
                 put(state, variant, alone)
                 good[variant] = True
         return _Lanes(everyone, 0 * everyone + 1, state).some(good)
-
-    def _from_the_guess(self, variants: Places, plain: Mask) -> tuple[Array, Mask, Mask, Mask]:
-        """Assemble variants from the guess, as `start.assemble` does, on the branch of the first.
-
-        Tried are Newton's own steps, where those from the guess as it is are known to lead to a
-        position or not (`plain`), the safeguarded attempt, and beyond the singular positions that
-        are nearest to where these lead. Returns positions (n, V), those nearest to the guess on the
-        branch, which have one, which are assembled at all, and which no attempt assembles.
-        """
-        inputs, time, equations = self._inputs, self._times[0], self._march.equations
-        most, sets, march = inputs.max_iterations, self._sets[variants], self._march_of(variants)
-        assert isinstance(march.engine, Planned)
-        guesses = np.repeat(inputs.guess[:, np.newaxis], variants.size, axis=1)
-        guesses = turned_guesses(equations, march.engine, guesses, time)
-        near = safeguarded(equations, sets, time, guesses.T, most)
-        found, least = np.full_like(guesses, np.nan), np.full(variants.size, np.inf)
-        is_assembled: Mask = np.zeros(variants.size, dtype=bool)
-
-        def attempt(begin: Array) -> Array:
-            q, good = self._corrected(variants, begin, most)
-            q = equations.turned_back(q, guesses)
-            q, holds = self._corrected(variants, q, MAX_CORRECTIONS, LARGE_ERROR)
-            state, checks = march.complete(march.engine.evaluate(q, time))
-            good = all_hold(good & holds, checks) & (state.sensitivity <= TOO_NEAR)
-            is_assembled[good] = True
-            reached = np.where(good, q, np.nan)
-            good &= ~self._leave(variants, q) & ~equations.is_turned(q, guesses)
-            away = np.where(good, equations.away(q, guesses), np.inf)
-            found[:, away < least] = q[:, away < least]
-            least[:] = np.minimum(away, least)
-            return reached
-
-        # Of redundant equations no determinants show a branch.
-        if self._begin.is_assembled and not inputs.code.redundant:
-            own = np.where(plain | (guesses != self._place).any(axis=0), guesses, np.nan)
-            for begin in (own, near):
-                attempt(other_sides(equations, sets, time, attempt(begin)))
-        return found, least < np.inf, is_assembled, np.isnan(near[0]) & ~plain & ~is_assembled
-
-    def _corrected(
-        self, variants: Places, q: Array, most: int, reach: float = np.inf
-    ) -> tuple[Array, Mask]:
-        """Return where Newton's own steps lead from positions (n, V), and which get there."""
-        q, good = q.copy(), np.asarray(np.isfinite(q).all(axis=0))
-        some = np.flatnonzero(good)
-        if some.size:
-            march = self._march_of(variants[some])
-            found = march.correct_together(q[:, some], self._times[0], most, reach)
-            q[:, some], good[some] = found.point.q, found.good
-        return q, good
 
     def _at_own_pace(self, lanes: _Lanes) -> _Lanes:
         """Take variants on, each by steps of its own, to the last time or to where it is stuck.
@@ -428,7 +301,11 @@ class _Chunk:
         that a set of many asks; returned are those that are stuck otherwise.
         """
         times, stuck = np.append(self._times, np.nan), [lanes.some(np.zeros(0, dtype=np.intp))]
-        march, begin, step = self._march_of(lanes.variants), lanes.state, lanes.interval(times) / 2
+        march, begin, step = (
+            self._sets.march(lanes.variants),
+            lanes.state,
+            lanes.interval(times) / 2,
+        )
         count, spent = np.zeros((2, step.size), dtype=np.int64)
         while lanes.variants.size:
             state, target = lanes.state, times[lanes.index]
@@ -458,7 +335,7 @@ class _Chunk:
             if not left.all():
                 lanes, begin = lanes.some(left), some_of(begin, left)
                 step, count, spent = step[left], count[left], spent[left]
-                march = self._march_of(lanes.variants)
+                march = self._sets.march(lanes.variants)
         return _joined(stuck)
 
     def _with_care(self, lanes: _Lanes) -> list[_Lanes]:
@@ -467,7 +344,7 @@ class _Chunk:
         lost: list[_Lost] = []
         for variant, index in zip(lanes.variants.tolist(), lanes.index.tolist(), strict=True):
             q = np.ascontiguousarray(self._arrays.motion[0, index - 1, :, self._places[variant]])
-            alone = self._alone(variant, q)
+            alone = self._sets.alone(variant, q)
             point = alone.equations.at(q, self._times[index - 1])
             known = Status.NOT_FINITE if point is None else alone.state(point)
             if isinstance(known, Status):
@@ -487,11 +364,11 @@ class _Chunk:
         """Find out why variants do not get to a time."""
         if not lost:
             return
-        sets = self._sets[[variant for variant, *_ in lost]]
+        sets = self._p[[variant for variant, *_ in lost]]
         times = np.array([self._times[index] for _, index, *_ in lost])
         places = np.array([known.point.q if end.state is None else end.state.point.q
                            for *_, known, end in lost])  # fmt: skip
-        equations, most = self._march.equations, self._inputs.max_iterations
+        equations, most = self._begin.equations, self._inputs.max_iterations
         vain = np.isnan(safeguarded(equations, sets, times, places, most)[0]).tolist()
         for (variant, index, alone, known, end), p, is_in_vain in zip(
             lost, sets, vain, strict=True
@@ -502,18 +379,7 @@ class _Chunk:
                 outcome = replace(outcome, status=status_after(found[0], outcome, t))
             self._take(index, variant, outcome)
 
-    def _march_of(self, variants: Places) -> March:
-        """Return the march of some variants together."""
-        engine = Planned(self._inputs.code, np.ascontiguousarray(self._sets[variants].T))
-        return March(self._march.equations, engine, self._inputs.tolerance)
-
-    def _alone(self, variant: int, q: Array) -> March:
-        """Return the march of one variant."""
-        inputs, time = self._inputs, self._times[0]
-        equations = problem(inputs.code.module, self._sets[variant], q, time)
-        return March(equations, equations.engine, inputs.tolerance)
-
-    def _record(self, lanes: _Lanes, state: State, good: Mask, iterations: Array) -> None:
+    def _record(self, lanes: _Lanes, state: State, good: Mask, iterations: Any) -> None:
         """Write down the variants that are good, each at its own next time."""
         arrays, index, place = self._arrays, lanes.index[good], self._places[lanes.variants[good]]
         found = state.point.q, state.q_dot, state.q_ddot
@@ -564,7 +430,7 @@ class _Chunk:
         """
         if not self._inputs.code.redundant:
             return found.determinants
-        engine = Planned(self._inputs.code, self._sets[variant])
+        engine = Planned(self._inputs.code, self._p[variant])
         return engine.determinants(engine.evaluate(found.point.q[:, np.newaxis], found.t))[:, 0]
 
 

@@ -78,7 +78,7 @@ class Variants(Struct):
     variants: Count
     t: Vector
     p: Table
-    guess: Vector
+    guess: Table
     size: Real
     tolerance: Real
     max_iterations: Int
@@ -468,17 +468,18 @@ def record(m: Variants, b: Point, o: Outcome, time: Count, first: Count, count: 
 
 
 def assemble(m: Variants, b: Point, s: Scales, first: Count, count: Count, o: Outcome):
-    """Assemble variants from the guess, at the first time."""
+    """Assemble variants from their guesses, at the first time."""
     constants(b, lanes=count)
     s.tolerance = m.tolerance
     for i in range(K):
         for k in lanes(count):
             b.p[i][k] = m.p[i, first + k]
+    for i in range(N):
+        for k in lanes(count):
+            b.q[i][k] = m.guess[i, first + k]
     for k in lanes(count):
         b.t[k] = m.t[0]
         o.is_over[k] = False
-        for i in range(N):
-            b.q[i][k] = m.guess[i]
     measure(b, m.size, s, lanes=count)
     correct(b, s, m.max_iterations, o, lanes=count)
     complete(b, s, o, lanes=count)
@@ -531,7 +532,7 @@ def march(m: Variants) -> Count:
     return done
 
 
-def put_to_rest(m: Variants, b: Point, o: Outcome, count: Count):
+def put_to_rest(m: Variants, b: Point, o: Outcome, first: Count, count: Count):
     """Let the variants that failed at a time rest at the guess, where they disturb no others."""
     for k in lanes(count):
         if o.is_over[k]:
@@ -539,7 +540,7 @@ def put_to_rest(m: Variants, b: Point, o: Outcome, count: Count):
         if o.status[k] != CONVERGED:
             o.is_over[k] = True
             for i in range(N):
-                b.q[i][k] = m.guess[i]
+                b.q[i][k] = m.guess[i, first + k]
                 b.q_dot[i][k] = 0.0
                 b.q_ddot[i][k] = 0.0
 
@@ -555,7 +556,7 @@ def march_variants(m: Variants) -> Count:
     for first in range(0, m.variants, LANES):
         count = min(m.variants - first, LANES)
         assemble(m, b, s, first, count, o)
-        put_to_rest(m, b, o, count)
+        put_to_rest(m, b, o, first, count)
         record(m, b, o, 0, first, count)
         for time in range(1, m.count):
             keep(before, b)
@@ -565,7 +566,7 @@ def march_variants(m: Variants) -> Count:
                 if o.status[k] != CONVERGED and not o.is_over[k]:
                     take_up(at, before, k)
                     advance(b, s, at, m.t[time], k, o)
-            put_to_rest(m, b, o, count)
+            put_to_rest(m, b, o, first, count)
             record(m, b, o, time, first, count)
         for k in lanes(count):
             if not o.is_over[k]:

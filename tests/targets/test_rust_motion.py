@@ -39,8 +39,8 @@ FOLLOWED = """macro_rules! followed {
         let mut residual = vec![0.0; all];
         let (mut status, mut iterations) = (vec![0; all], vec![0; all]);
         $m::march_variants(&mut $m::Variants {
-            count, variants: sets, t, p, guess, size, tolerance: 1e-10, max_iterations: 25,
-            q, q_dot, q_ddot,
+            count, variants: sets, t, p, guess: &guess.repeat(sets), size, tolerance: 1e-10,
+            max_iterations: 25, q, q_dot, q_ddot,
             residual: &mut residual, status: &mut status, iterations: &mut iterations,
         });
         println!("{:?}", status);

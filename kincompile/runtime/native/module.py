@@ -304,6 +304,7 @@ class _Functions:
 
         def march_variants(
             inputs: Inputs,
+            guess: Array,
             size: float,
             tolerance: float,
             sets: Array,
@@ -312,15 +313,16 @@ class _Functions:
             status: NDArray[np.intc],
             iterations: NDArray[np.intc],
         ) -> int:
-            """Follow the motion of each variant from the guess as long as it converges.
+            """Follow the motion of each variant from a guess as long as it converges.
 
-            `sets` (B, k) are the parameters; filled are `states` (3, N, n, B) with position,
-            velocity and acceleration, and residual, status and iterations, (N, B) each. Returns
-            how many variants converged at all times.
+            The guess is that of all, (n,), or of each, (n, B), and `sets` (B, k) are the
+            parameters; filled are `states` (3, N, n, B) with position, velocity and acceleration,
+            and residual, status and iterations, (N, B) each. Returns how many variants converged
+            at all times.
             """
-            t, guess = inputs.t, inputs.guess
-            motions = Variants(t.size, len(sets), t.ctypes.data, numbers_of_batch(sets.T))
-            motions.guess, motions.time = guess.ctypes.data, states.strides[1] // NUMBER
+            t, given = inputs.t, [numbers_of_batch(x) for x in (sets.T, guess)]
+            motions = Variants(t.size, len(sets), t.ctypes.data, *given)
+            motions.time = states.strides[1] // NUMBER
             _fill(motions, inputs, (size, tolerance), states[:, 0], (residual, status, iterations))
             return int(run(byref(motions)))
 

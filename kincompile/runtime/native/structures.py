@@ -65,7 +65,7 @@ class Variants(Structure):
         ("variants", c_size_t),
         ("t", c_void_p),
         ("p", Numbers),
-        ("guess", c_void_p),
+        ("guess", Numbers),
         ("size", c_double),
         ("tolerance", c_double),
         ("max_iterations", c_int),

@@ -163,10 +163,26 @@ def test_that_compiled_code_solves_what_is_ordinary_alone(
 ):
     module = example_named("four_bar").native
     careful: list[object] = []
-    monkeypatch.setattr("kincompile.runtime.variants._Chunk.run", careful.append)
+    monkeypatch.setattr("kincompile.runtime.variants._Chunk._assembled", careful.append)
     found = kc.solve(module, np.linspace(0, 1, 9), {"a": module.DEFAULTS[0] * np.ones(5)})
     assert found.success
     assert not careful
+
+
+def test_that_compiled_code_follows_each_set_from_its_own_position(
+    example_named, quick_compiler, monkeypatch
+):
+    example = example_named("four_bar")
+    lengths = example.module.DEFAULTS[0] * np.where(np.arange(24) % 2, 3, 1)
+    t = np.linspace(0, 4, 50)
+    expected = kc.solve(example.module, t, {"a": lengths})
+    steps: list[object] = []
+    monkeypatch.setattr("kincompile.runtime.variants._Chunk._follow", steps.append)
+    found = kc.solve(example.native, t, {"a": lengths})
+    assert not steps
+    np.testing.assert_array_equal(found.status, expected.status)
+    assert (found.status[1::2] == Status.LOCK_UP).any(axis=1).all()
+    np.testing.assert_allclose(found.q, expected.q, atol=1e-9)
 
 
 def locking(four_bar, count):

@@ -87,12 +87,13 @@ def marched(module, lanes, t, sets, *, together=False):
     guess, size = start_of(module, float(t[0]))
     n, shape = module.N_COORDINATES, (t.size, len(sets)) if together else (1, t.size)
     columns = np.transpose(sets) if together else np.repeat(np.transpose(sets), lanes, axis=1)
+    guesses = np.repeat(guess[:, np.newaxis], columns.shape[1], axis=1)
     written = {name: np.full((n, *shape), np.nan) for name in ("q", "q_dot", "q_ddot")}
     said = {name: np.zeros(shape[0] * shape[1], int) for name in ("status", "iterations")}
     said["residual"] = np.full(shape[0] * shape[1], np.nan)
     variants = text.Variants(
-        count=t.size, variants=len(sets) if together else 0, t=t, p=columns, guess=guess, size=size,
-        tolerance=criteria.TOLERANCE, max_iterations=25, **written, **said,
+        count=t.size, variants=len(sets) if together else 0, t=t, p=columns, guess=guesses,
+        size=size, tolerance=criteria.TOLERANCE, max_iterations=25, **written, **said,
     )  # fmt: skip
     with np.errstate(all="ignore"):
         reached = (text.march_variants if together else text.march)(variants)
