@@ -303,6 +303,15 @@ def covers(bodies: Iterable[Sequence[int] | range]) -> list[Sequence[int]]:
     return [columns[3:] for columns in bodies if len(columns) == SPATIAL_COORDINATES]
 
 
+def first_of_cover(n: int, bodies: Iterable[Sequence[int] | range]) -> list[int]:
+    """Return of each of n coordinates the first Euler parameter of its body; n where it is none."""
+    found = [n] * n
+    for cover in covers(bodies):
+        for column in cover:
+            found[column] = cover[0]
+    return found
+
+
 def may_turn(units: Iterable[str], bodies: Iterable[Sequence[int] | range]) -> list[bool]:
     """Return which coordinates are angles, or may be: free ones whose unit is not known."""
     owned = {column for columns in bodies for column in columns}

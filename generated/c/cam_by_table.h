@@ -88,8 +88,22 @@ enum {
                                    // beyond all bounds before this time
 };
 
+// A guess of the position at a time. It may be rough: safeguarded steps, restarts and angles turned
+// by whole turns lead to the assembly that it means.
+typedef struct {
+    double t;
+    const double *p;     // 1 parameters
+    const double *q;     // 7 coordinates
+    double size;         // of the mechanism: a long lever arm, such as its largest link
+    double tolerance;    // such as 1e-10
+    int max_iterations;  // such as 25
+} cam_by_table_rough_guess;
+
+// Find the position q, 7 coordinates, that a guess means; returns what became of it.
+int cam_by_table_assemble(const cam_by_table_rough_guess *guess, double *q);
+
 // A motion over the times t, rising or falling, with one set of parameters. Newton starts from the
-// guess, without safeguards: it should be near an assembled position. It stops when a correction,
+// guess, without safeguards: it should be near an assembled position, such as the above. It stops when a correction,
 // of lengths in sizes of the mechanism, is at most the tolerance; that correction is applied.
 typedef struct {
     size_t count;

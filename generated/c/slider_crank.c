@@ -34,7 +34,7 @@ enum {
     K = 0,  // parameters
     NONZEROS = 21,  // of Phi_q
     LANES = 32,  // points in a strip
-    FAR = (4 << 20) / 8 / (48),  // points whose results leave little of a cache
+    FROM_MEMORY = (4 << 20) / 8 / (48),  // points whose results leave little of a cache
     FACTORS = 8,  // numbers that the planned solve keeps of Phi_q
     BLOCKS = 1,  // blocks of the planned solve
 };
@@ -706,7 +706,7 @@ int slider_crank_evaluate(const slider_crank_batch *batch)
             wanted |= 1u << k;
     if (wanted == 0)
         return 0;
-    const int is_far = batch->count > FAR, wants_rates = wanted & READS_RATES && batch->q_dot.first;
+    const int is_far = batch->count > FROM_MEMORY, wants_rates = wanted & READS_RATES && batch->q_dot.first;
     const size_t widest = batch->count < LANES ? batch->count : LANES;
     if (!batch->varying_only)
         place_constants(&b, matrices, widest);
@@ -1301,4 +1301,714 @@ size_t slider_crank_march(const slider_crank_motion *motion)
     };
     return march(&m);
 }
+
+// The start: who brings one's own leaves it out of the library.
+#ifndef KINCOMPILE_WITHOUT_START
+
+// Which coordinates are angles or may be, and of each the first of its body's Euler parameters; N
+// where it is none.
+static const int MAY_TURN[] = {
+    0, 0, 1, 0, 0, 1, 0, 0, 1,
+};
+static const int COVER[] = {
+    9, 9, 9, 9, 9, 9, 9, 9, 9,
+};
+// By what a start judges: how far from a guess is near, settled, astray, thrown; how near another
+// assembly is named as, and looked at beyond a singular position; when two positions are the same.
+static const double NEAR_ANGLE = 0.5235987755982988, NEAR_PART = 0.1, SETTLED = 0.5;
+static const double ASTRAY = 5.0, THROWN = 10.0, FAR = 0.7853981633974483, AS_NEAR = 1.1;
+static const double MIRRORED = 2.0, MIRROR_STEP = 1e-05, FOLDED = 1e-09;
+static const double SAME_POSITION = 1e-06, WILD = 1000.0, STEEP = 1000000.0;
+static const double LONGEST_P = 2.0, TURN = 6.283185307179586;
+// Safeguarded steps: the longest of an angle, the weight of the gradient, the part of the decrease
+// that must come true, the shortest part of a step, how far restarts are.
+static const double LARGEST_ANGLE = 0.5, BEND = 0.01, SUFFICIENT = 0.0001;
+static const double SHORTEST_STEP = 9.5367431640625e-07, NUDGE = 0.3;
+static const int RESTARTS = 4, MOST_MIRRORED = 300;
+// Rows and columns of a matrix of least squares.
+enum { TALL = M + N, WIDE = N + 1 };
+
+// A number with 24 bits.
+static double single(double x)
+{
+    const double near = (float)x;
+    return fabs(near - x) <= fabs(x) / 16777216.0 ? near : x;
+}
+
+// By what positions around a guess are judged, and numbers that are worked on.
+typedef struct {
+    double t;
+    double tolerance;
+    double meant[N];            // the guess, with angles turned as the equations show that it is meant
+    double reference[N];        // scale of each coordinate
+    double near[N];             // how far each may be from an assembly that it is near
+    double place[N];            // how large it is in the guess
+    double floor;               // correction, in scales, below which there are only rounding errors
+    double magnitude[M];        // what the terms of each equation contribute at a generic position
+    double noise[M];            // what rounding errors of the coordinates leave of each equation
+    double limit[M];            // what its terms contribute at most, wherever they are
+    double terms[M];            // what they contribute at a point
+    double step[N];
+    double way[N];
+    double matrix[TALL][WIDE];  // of equations, the last column their right side
+    double directions[WIDE][WIDE];
+} start;
+
+// A run of Newton's method, and by what it is compared with others.
+typedef struct {
+    int status;
+    int iterations;
+    int is_thrown;    // whether it went so far that rounding errors decide where it ends
+    double q[N];      // the last position
+    double first[N];  // the position after the first correction
+    double away;      // from the guess, in millionths of what is near, up to there
+    int rank;         // 2 far from the guess, 1 on another branch than it shows, 0 as it is meant
+    double far;       // distance from the guess, in millionths of the scales
+} attempt;
+
+// Give the Euler parameters of the guess a length near one: any length is an orientation. By their
+// largest first, since the squares of large ones overflow.
+static void orient(start *s)
+{
+    for (int i = 0; i < N; i++)
+        if (COVER[i] == i) {
+            double most = 0.0;
+            double total = 0.0;
+            for (int k = 0; k < 4; k++)
+                most = fabs(s->meant[i + k]) > most ? fabs(s->meant[i + k]) : most;
+            for (int k = 0; k < 4; k++) {
+                const double part = s->meant[i + k] / most;
+                total += part * part;
+            }
+            const double rest = sqrt(total);
+            if (most * rest > LONGEST_P || most * rest < 1.0 / LONGEST_P) {
+                for (int k = 0; k < 4; k++)
+                    s->meant[i + k] = s->meant[i + k] / most / rest;
+            }
+        }
+}
+
+// Evaluate the equations at a position; return whether they have values there.
+static int place_at(const double *q, double t, strip *b)
+{
+    double total = 0.0;
+    b->t[0] = t;
+    for (int i = 0; i < N; i++)
+        b->q[i][0] = q[i];
+    position_of_strip(b, 1);
+    for (int i = 0; i < M; i++)
+        total += b->Phi[i][0];
+    return isfinite(total);
+}
+
+// Find what the terms of each equation contribute at scales of the coordinates.
+static void find_terms(const double *scale, strip *b, start *s)
+{
+    memset(s->terms, 0, sizeof s->terms);
+    for (int e = 0; e < NONZEROS; e++) {
+        const int i = slider_crank_pattern[e][0];
+        const int j = slider_crank_pattern[e][1];
+        s->terms[i] += fabs(b->Phi_q[e][0]) * scale[j];
+    }
+    for (int i = 0; i < M; i++) {
+        const double most = s->terms[i] <= s->limit[i] ? s->terms[i] : s->limit[i];
+        s->terms[i] = most > s->magnitude[i] ? most : s->magnitude[i];
+    }
+}
+
+// Find by what positions around one are judged.
+static void judge_around(const double *q, double size, strip *b, start *s)
+{
+    double generic[N];
+    double wide[N];
+    double farthest = 0.0;
+    for (int i = 0; i < N; i++) {
+        s->reference[i] = ANGULAR[i] ? 1.0 : size;
+        s->near[i] = ANGULAR[i] ? NEAR_ANGLE : NEAR_PART * size;
+        s->place[i] = fabs(q[i]);
+        generic[i] = q[i] + s->reference[i] * PROBE[i];
+        wide[i] = s->reference[i] + s->place[i];
+        if (!ANGULAR[i] && s->place[i] > farthest)
+            farthest = s->place[i];
+    }
+    s->floor = ROUNDING * farthest / size;
+    memset(s->magnitude, 0, sizeof s->magnitude);
+    memset(s->noise, 0, sizeof s->noise);
+    for (int i = 0; i < M; i++)
+        s->limit[i] = INFINITY;
+    if (place_at(generic, s->t, b)) {
+        find_terms(wide, b, s);
+        for (int i = 0; i < M; i++)
+            s->noise[i] = ROUNDING * s->terms[i];
+        find_terms(s->reference, b, s);
+        for (int i = 0; i < M; i++) {
+            // With 24 bits: rounding errors do not show in what is judged by it.
+            s->magnitude[i] = single(s->terms[i]);
+            s->limit[i] = s->noise[i] > 0.0 ? STEEP / ROUNDING * s->noise[i] : INFINITY;
+        }
+    }
+}
+
+// Return whether every equation holds, relative to what its terms contribute.
+static int holds(strip *b, start *s)
+{
+    find_terms(s->reference, b, s);
+    for (int i = 0; i < M; i++)
+        if (!(fabs(b->Phi[i][0]) <= RESIDUAL_FACTOR * s->tolerance * s->terms[i] + s->noise[i]))
+            return 0;
+    return 1;
+}
+
+// Return whether every equation holds as well as floating point permits.
+static int holds_to_rounding(strip *b, start *s)
+{
+    double scale[N];
+    for (int i = 0; i < N; i++) {
+        double size = fabs(b->q[i][0]);
+        const double most = WILD * s->reference[i] + s->place[i];
+        size = size > s->reference[i] ? size : s->reference[i];
+        scale[i] = size < most ? size : most;
+    }
+    find_terms(scale, b, s);
+    for (int i = 0; i < M; i++)
+        if (!(fabs(b->Phi[i][0]) <= ROUNDING * s->terms[i]))
+            return 0;
+    return 1;
+}
+
+// Return by how much all equations are missed, relative to terms.
+static double residual(const double *terms, strip *b)
+{
+    double total = 0.0;
+    for (int i = 0; i < M; i++) {
+        const double part = b->Phi[i][0] / (terms[i] > 0.0 ? terms[i] : 1.0);
+        total += part * part;
+    }
+    return sqrt(total);
+}
+
+// Fill the matrix with Phi_q and the right side -Phi, in scales and relative to terms.
+static void fill_matrix(const double *scale, const double *terms, strip *b, start *s)
+{
+    memset(s->matrix, 0, sizeof s->matrix);
+    for (int e = 0; e < NONZEROS; e++) {
+        const int i = slider_crank_pattern[e][0];
+        const int j = slider_crank_pattern[e][1];
+        s->matrix[i][j] = b->Phi_q[e][0] * scale[j] / (terms[i] > 0.0 ? terms[i] : 1.0);
+    }
+    for (int i = 0; i < M; i++)
+        s->matrix[i][N] = -b->Phi[i][0] / (terms[i] > 0.0 ? terms[i] : 1.0);
+}
+
+// Find the step by which so many rows miss least (Householder); return whether there is one.
+static int solve_least(start *s, size_t count)
+{
+    double total = 0.0;
+    for (int k = 0; k < N; k++) {
+        double square = 0.0;
+        for (size_t i = k; i < count; i++)
+            square += s->matrix[i][k] * s->matrix[i][k];
+        if (square == 0.0) {
+            // Nothing depends on it: the shortest step leaves it.
+            s->matrix[k][k] = INFINITY;
+        } else {
+            const double size = s->matrix[k][k] > 0.0 ? -sqrt(square) : sqrt(square);
+            const double head = s->matrix[k][k] - size;
+            for (int j = k + 1; j < WIDE; j++) {
+                double dot = head * s->matrix[k][j];
+                for (size_t i = k + 1; i < count; i++)
+                    dot += s->matrix[i][k] * s->matrix[i][j];
+                dot = dot / (-size * head);
+                s->matrix[k][j] -= dot * head;
+                for (size_t i = k + 1; i < count; i++)
+                    s->matrix[i][j] -= dot * s->matrix[i][k];
+            }
+            s->matrix[k][k] = size;
+        }
+    }
+    for (int n = 0; n < N; n++) {
+        const int k = N - 1 - n;
+        double value = s->matrix[k][N];
+        for (int j = k + 1; j < N; j++)
+            value -= s->matrix[k][j] * s->step[j];
+        s->step[k] = value / s->matrix[k][k];
+        total += fabs(s->step[k]);
+    }
+    return isfinite(total);
+}
+
+// Apply the whole correction to a position; return CONVERGED, or why there is none.
+static int plain_step(const double *q, strip *b, start *s)
+{
+    double trial[N];
+    for (int i = 0; i < N; i++)
+        trial[i] = 1.0;
+    for (int i = 0; i < M; i++)
+        s->terms[i] = 1.0;
+    fill_matrix(trial, s->terms, b, s);
+    if (!solve_least(s, M))
+        return SLIDER_CRANK_SINGULAR;
+    for (int i = 0; i < N; i++)
+        trial[i] = q[i] + s->step[i];
+    return place_at(trial, s->t, b) ? SLIDER_CRANK_CONVERGED : SLIDER_CRANK_NOT_FINITE;
+}
+
+// Apply as much of the correction as keeps the angles near and lowers the residual. It is bent
+// towards the gradient while the residual is large (Levenberg, Marquardt).
+static int safeguarded_step(const double *q, strip *b, start *s)
+{
+    double trial[N];
+    find_terms(s->reference, b, s);
+    double terms[M];
+    memcpy(terms, s->terms, sizeof terms);
+    const double before = residual(terms, b);
+    fill_matrix(s->reference, terms, b, s);
+    for (int i = 0; i < N; i++)
+        s->matrix[M + i][i] = sqrt(BEND * (before < 1.0 ? before : 1.0));
+    if (!solve_least(s, M + N))
+        return SLIDER_CRANK_NOT_FINITE;
+    double excess = 1.0;
+    for (int i = 0; i < N; i++) {
+        const double part = fabs(s->step[i]) / (ANGULAR[i] ? LARGEST_ANGLE : 1.0);
+        excess = part > excess ? part : excess;
+        s->step[i] *= s->reference[i];
+    }
+    double part = 1.0 / excess;
+    while (part >= SHORTEST_STEP) {
+        for (int i = 0; i < N; i++)
+            trial[i] = q[i] + part * s->step[i];
+        if (place_at(trial, s->t, b)) {
+            const double after = residual(terms, b);
+            if (after <= (1.0 - SUFFICIENT * part) * before || after <= ROUNDING)
+                return SLIDER_CRANK_CONVERGED;
+        }
+        part *= 0.5;
+    }
+    return SLIDER_CRANK_NOT_CONVERGED;
+}
+
+// Run Newton's method from a guess, by safeguarded steps or by plain ones.
+static void iterate(const double *guess, int is_safe, int most, strip *b, start *s, attempt *a)
+{
+    double size = 0.0;
+    int is_crawling = 0;
+    a->iterations = 0;
+    a->is_thrown = 0;
+    memcpy(a->q, guess, sizeof a->q);
+    memcpy(a->first, guess, sizeof a->first);
+    a->status = place_at(guess, s->t, b) ? SLIDER_CRANK_NOT_CONVERGED : SLIDER_CRANK_NOT_FINITE;
+    int is_going = a->status == SLIDER_CRANK_NOT_CONVERGED;
+    while (is_going && a->iterations < most) {
+        const int moved = is_safe ? safeguarded_step(a->q, b, s) : plain_step(a->q, b, s);
+        if (moved != SLIDER_CRANK_CONVERGED) {
+            a->status = (int)moved;
+            is_going = 0;
+        } else {
+            int is_small = 1;
+            const double last = size;
+            size = 0.0;
+            for (int i = 0; i < N; i++) {
+                const double change = b->q[i][0] - a->q[i];
+                double allowed = s->tolerance > s->floor ? s->tolerance : s->floor;
+                allowed = allowed * s->reference[i] + ROUNDING * fabs(b->q[i][0]);
+                is_small = is_small && fabs(change) <= allowed;
+                size += change * change;
+                a->q[i] = b->q[i][0];
+                if (!(fabs(a->q[i] - guess[i]) <= THROWN * s->near[i]))
+                    a->is_thrown = 1;
+            }
+            size = sqrt(size);
+            a->iterations++;
+            is_crawling = a->iterations > 1 && size > last / 4.0;
+            if (a->iterations == 1)
+                memcpy(a->first, a->q, sizeof a->first);
+            int has_ended = is_small && holds(b, s);
+            if (!has_ended && (is_small || is_crawling))
+                has_ended = holds_to_rounding(b, s);
+            if (has_ended) {
+                a->status = SLIDER_CRANK_CONVERGED;
+                is_going = 0;
+            }
+        }
+    }
+    if (is_going && is_crawling && holds(b, s))
+        a->status = SLIDER_CRANK_SINGULAR;
+}
+
+// Find the way from a guess to a position as a mechanism shows it. Whole turns of an angle are no
+// way, and Euler parameters p and -p are one orientation.
+static void find_way(const double *q, const double *guess, start *s)
+{
+    for (int i = 0; i < N; i++) {
+        const double change = q[i] - guess[i];
+        s->way[i] = ANGULAR[i] ? change - TURN * floor(change / TURN + 0.5) : change;
+    }
+    for (int i = 0; i < N; i++)
+        if (COVER[i] == i) {
+            double along = 0.0;
+            for (int k = 0; k < 4; k++)
+                along += q[i + k] * guess[i + k];
+            for (int k = 0; k < 4; k++) {
+                const double both = q[i + k] + guess[i + k];
+                s->way[i + k] = along < 0.0 ? both : q[i + k] - guess[i + k];
+            }
+        }
+}
+
+// Return how far a position is from a guess; up to 1.0 it is near.
+static double away_from(const double *q, const double *guess, start *s)
+{
+    double most = 0.0;
+    find_way(q, guess, s);
+    for (int i = 0; i < N; i++) {
+        const double part = fabs(s->way[i]) / s->near[i];
+        most = part <= most ? most : part;
+    }
+    return most;
+}
+
+// Turn angles of the guess by whole turns towards its first correction; return whether any was.
+// Only those count that the equations do not leave free by whole turns, as driven ones, and only
+// where the equations miss less then: a step of a whole turn throws all the others far.
+static int turn(const double *first, strip *b, start *s)
+{
+    double Phi[M];
+    double turns[N];
+    double trial[N];
+    memcpy(trial, s->meant, sizeof trial);
+    int is_turned = 0;
+    if (!place_at(s->meant, s->t, b))
+        return 0;
+    double missed_least = residual(s->magnitude, b);
+    for (int i = 0; i < M; i++)
+        Phi[i] = b->Phi[i][0];
+    for (int i = 0; i < N; i++) {
+        turns[i] = ANGULAR[i] ? floor((first[i] - s->meant[i]) / TURN + 0.5) : 0.0;
+        if (turns[i] != 0.0) {
+            trial[i] += TURN;
+            if (place_at(trial, s->t, b)) {
+                for (int k = 0; k < M; k++)
+                    b->Phi[k][0] -= Phi[k];
+                if (residual(s->magnitude, b) <= SAME_POSITION)
+                    turns[i] = 0.0;
+            }
+            trial[i] = s->meant[i];
+        }
+    }
+    // Together first, then each alone.
+    for (int n = 0; n < N + 1; n++) {
+        int is_new = 0;
+        memcpy(trial, s->meant, sizeof trial);
+        for (int i = 0; i < N; i++)
+            if (turns[i] != 0.0 && (n == 0 || n == i + 1)) {
+                trial[i] += TURN * turns[i];
+                is_new = 1;
+            }
+        if (is_new && place_at(trial, s->t, b)) {
+            const double missed_now = residual(s->magnitude, b);
+            if (missed_now < (1.0 - SUFFICIENT) * missed_least) {
+                missed_least = missed_now;
+                is_turned = 1;
+                for (int i = 0; i < N; i++)
+                    if (n == 0 || n == i + 1)
+                        turns[i] = 0.0;
+                memcpy(s->meant, trial, sizeof s->meant);
+            }
+        }
+    }
+    return is_turned;
+}
+
+// Turn angles by whole turns towards a guess, and Euler parameters to its signs. As far as the
+// equations allow it. Parameters that are as far from it either way become those whose largest is
+// positive.
+static void unwind(const double *guess, strip *b, start *s, attempt *a, attempt *other)
+{
+    // Together first: angles that a gear or a driver connects turn together.
+    for (int n = 0; n < N + 1; n++) {
+        int is_new = 0;
+        double trial[N];
+        memcpy(trial, a->q, sizeof trial);
+        for (int i = 0; i < N; i++) {
+            const int is_wound = MAY_TURN[i] && fabs(trial[i] - guess[i]) > 0.5 * TURN;
+            if (is_wound && (n == 0 || n == i + 1)) {
+                trial[i] -= TURN * floor((trial[i] - guess[i]) / TURN + 0.5);
+                is_new = 1;
+            }
+        }
+        if (is_new) {
+            iterate(trial, 0, MAX_CORRECTIONS, b, s, other);
+            int is_same = other->status == SLIDER_CRANK_CONVERGED;
+            for (int i = 0; i < N; i++)
+                is_same = is_same
+                    && fabs(other->q[i] - trial[i]) <= SAME_POSITION * s->reference[i];
+            if (is_same)
+                memcpy(a->q, other->q, sizeof a->q);
+        }
+    }
+    for (int i = 0; i < N; i++)
+        if (COVER[i] == i) {
+            double along = 0.0;
+            double most = 0.0;
+            double trial[N];
+            memcpy(trial, a->q, sizeof trial);
+            for (int k = 0; k < 4; k++) {
+                const double p = a->q[i + k];
+                along += p * guess[i + k];
+                most = fabs(p) > fabs(most) ? p : most;
+                trial[i + k] = -p;
+            }
+            const int is_turned = (fabs(along) > SAME_POSITION ? along : most) < 0.0;
+            if (is_turned && place_at(trial, s->t, b) && holds(b, s))
+                memcpy(a->q, trial, sizeof a->q);
+        }
+}
+
+// Return whether the guess shows a branch, and a position found from it lies on another. Nothing
+// but the rows that are solved has a determinant where others repeat them.
+static int leaves_branch(const double *q, strip *b, const start *s)
+{
+    double shown[BLOCKS > 0 ? BLOCKS : 1];
+    int leaves = 0;
+    for (int i = 0; i < M; i++)
+        if (IS_REDUNDANT[i])
+            return 0;
+    if (!place_at(s->meant, s->t, b))
+        return 0;
+    factor_of_strip(b, 1);
+    for (int i = 0; i < BLOCKS; i++)
+        shown[i] = b->determinants[i][0];
+    if (!place_at(q, s->t, b))
+        return 1;
+    factor_of_strip(b, 1);
+    for (int i = 0; i < BLOCKS; i++) {
+        const double here = b->determinants[i][0];
+        if (!(fabs(shown[i]) > FOLDED * fabs(here)))
+            return 0;
+        leaves = leaves || !(shown[i] > 0.0 ? here > 0.0 : here < 0.0);
+    }
+    return leaves;
+}
+
+// Take an attempt that converged as the best one, where it is nearer to what a guess means. What
+// is near the guess comes first, the nearest of it; then what is not far, then what is on its
+// branch, then the nearer.
+static void take(strip *b, start *s, attempt *a, attempt *other, attempt *best)
+{
+    unwind(s->meant, b, s, a, other);
+    const double away = away_from(a->q, s->meant, s);
+    int is_far = 0;
+    a->far = 0.0;
+    for (int i = 0; i < N; i++) {
+        const double size = fabs(s->way[i]);
+        is_far = is_far || (MAY_TURN[i] && size > FAR);
+        a->far = size / s->reference[i] > a->far ? size / s->reference[i] : a->far;
+    }
+    a->far = floor(1000000.0 * a->far + 0.5);
+    a->away = floor(1000000.0 * (away < 1.0 ? away : 1.0) + 0.5);
+    a->rank = 2;
+    if (!is_far)
+        a->rank = leaves_branch(a->q, b, s) ? 1 : 0;
+    int is_better = a->far < best->far;
+    if (best->status != SLIDER_CRANK_CONVERGED) {
+        is_better = 1;
+    } else if (a->away != best->away) {
+        is_better = a->away < best->away;
+    } else if (a->rank != best->rank) {
+        is_better = a->rank < best->rank;
+    }
+    if (is_better) {
+        best->status = a->status;
+        best->iterations = a->iterations;
+        memcpy(best->q, a->q, sizeof best->q);
+        best->away = a->away;
+        best->rank = a->rank;
+        best->far = a->far;
+    }
+}
+
+// Find about where the mechanism can be assembled beyond the nearest singular position. Along its
+// movement v the smallest singular value u^T Phi_q v falls to zero half way. The position is left
+// in the step. Return whether there is one; a large mechanism is not asked.
+static int other_side(const double *q, strip *b, start *s)
+{
+    if (N > MOST_MIRRORED || !place_at(q, s->t, b))
+        return 0;
+    double trial[N];
+    double image[M];
+    fill_matrix(s->near, s->magnitude, b, s);
+    memset(s->directions, 0, sizeof s->directions);
+    for (int i = 0; i < N; i++)
+        s->directions[i][i] = 1.0;
+    int is_done = 0;
+    int sweeps = 0;
+    // Rotations of pairs of columns until all are orthogonal (Jacobi).
+    while (!is_done && sweeps < 60) {
+        is_done = 1;
+        sweeps++;
+        for (int i = 0; i < N; i++)
+            for (int j = i + 1; j < N; j++) {
+                double first = 0.0;
+                double second = 0.0;
+                double mixed = 0.0;
+                for (int k = 0; k < M; k++) {
+                    first += s->matrix[k][i] * s->matrix[k][i];
+                    second += s->matrix[k][j] * s->matrix[k][j];
+                    mixed += s->matrix[k][i] * s->matrix[k][j];
+                }
+                if (fabs(mixed) > ROUNDING / 16.0 * sqrt(first * second)) {
+                    is_done = 0;
+                    const double zeta = (second - first) / (2.0 * mixed);
+                    double tangent = 1.0 / (fabs(zeta) + sqrt(1.0 + zeta * zeta));
+                    tangent = zeta >= 0.0 ? tangent : -tangent;
+                    const double cosine = 1.0 / sqrt(1.0 + tangent * tangent);
+                    for (int k = 0; k < M; k++) {
+                        const double x = s->matrix[k][i];
+                        const double y = s->matrix[k][j];
+                        s->matrix[k][i] = cosine * (x - tangent * y);
+                        s->matrix[k][j] = cosine * (tangent * x + y);
+                    }
+                    for (int k = 0; k < N; k++) {
+                        const double x = s->directions[k][i];
+                        const double y = s->directions[k][j];
+                        s->directions[k][i] = cosine * (x - tangent * y);
+                        s->directions[k][j] = cosine * (tangent * x + y);
+                    }
+                }
+            }
+    }
+    int smallest = 0;
+    double least = INFINITY;
+    for (int i = 0; i < N; i++) {
+        double square = 0.0;
+        for (int k = 0; k < M; k++)
+            square += s->matrix[k][i] * s->matrix[k][i];
+        if (square < least) {
+            least = square;
+            smallest = i;
+        }
+    }
+    for (int i = 0; i < M; i++)
+        image[i] = s->matrix[i][smallest];
+    for (int i = 0; i < N; i++) {
+        s->way[i] = s->near[i] * s->directions[i][smallest];
+        trial[i] = q[i] + MIRROR_STEP * s->way[i];
+    }
+    if (!place_at(trial, s->t, b))
+        return 0;
+    double bend = 0.0;
+    for (int e = 0; e < NONZEROS; e++) {
+        const int i = slider_crank_pattern[e][0];
+        const double size = s->magnitude[i] > 0.0 ? s->magnitude[i] : 1.0;
+        bend += image[i] * b->Phi_q[e][0] / size * s->way[slider_crank_pattern[e][1]];
+    }
+    double total = 0.0;
+    bend = (bend - least) / MIRROR_STEP;
+    for (int i = 0; i < N; i++) {
+        s->step[i] = q[i] - 2.0 * least / bend * s->way[i];
+        total += s->step[i];
+    }
+    return isfinite(total);
+}
+
+// Return whether an attempt led to an assembly so near that no nearer one is sought.
+static int is_settled(const start *s, const attempt *a)
+{
+    for (int i = 0; i < N; i++)
+        if (!(fabs(a->q[i] - s->meant[i]) <= SETTLED * s->near[i]))
+            return 0;
+    return a->status == SLIDER_CRANK_CONVERGED;
+}
+
+// Make safeguarded attempts until one converges: from the guess, then further and further away.
+// With all bodies on a line no equation tells which way to bend. Where a position was found
+// already, one is enough.
+static void rescue(int is_sound, int most, strip *b, start *s, attempt *a)
+{
+    double begin[N];
+    double reach = 0.0;
+    for (int k = 0; k < (is_sound ? 1 : RESTARTS + 1); k++) {
+        for (int i = 0; i < N; i++) {
+            const int place = i + 1 >= k ? i + 1 - k : M + i + 1 - k;
+            begin[i] = s->meant[i];
+            if (k > 0)
+                begin[i] += reach * s->reference[i] * PROBE[place];
+        }
+        iterate(begin, 1, most, b, s, a);
+        if (a->status == SLIDER_CRANK_CONVERGED)
+            break;
+        reach += NUDGE;
+    }
+}
+
+// Find a position from a guess, or why there is none.
+static void position_from(const double *guess, double size, int most, strip *b, start *s,
+    attempt *best)
+{
+    attempt plain;
+    attempt a;
+    attempt other;
+    memcpy(s->meant, guess, sizeof s->meant);
+    orient(s);
+    double near[N];
+    memcpy(near, s->meant, sizeof near);
+    judge_around(near, size, b, s);
+    best->status = SLIDER_CRANK_NOT_FINITE;
+    memcpy(best->q, near, sizeof best->q);
+    if (place_at(near, s->t, b)) {
+        best->status = SLIDER_CRANK_NOT_CONVERGED;
+        iterate(s->meant, 0, most, b, s, &plain);
+        while (!is_settled(s, &plain) && turn(plain.first, b, s))
+            iterate(s->meant, 0, most, b, s, &plain);
+        const int is_near = is_settled(s, &plain);
+        const int is_sound = plain.status == SLIDER_CRANK_CONVERGED && !plain.is_thrown;
+        if (is_near || is_sound)
+            take(b, s, &plain, &other, best);
+        int is_astray = !is_near && best->status != SLIDER_CRANK_CONVERGED;
+        if (is_sound && !is_near)
+            is_astray = best->rank > 0 || away_from(best->q, s->meant, s) > ASTRAY;
+        if (is_astray) {
+            rescue(is_sound, most, b, s, &a);
+            if (a.status == SLIDER_CRANK_CONVERGED) {
+                take(b, s, &a, &other, best);
+            } else if (plain.status == SLIDER_CRANK_CONVERGED && !is_sound) {
+                take(b, s, &plain, &other, best);
+            } else if (!is_sound) {
+                best->status = a.status;
+            }
+        }
+        if (!is_near && best->status == SLIDER_CRANK_CONVERGED && other_side(best->q, b, s)) {
+            double opposite[N];
+            memcpy(opposite, s->step, sizeof opposite);
+            double away = away_from(best->q, s->meant, s);
+            away = away > 1.0 ? away : 1.0;
+            const double reach = AS_NEAR * away < MIRRORED ? AS_NEAR * away : MIRRORED;
+            if (away_from(opposite, s->meant, s) <= MIRRORED * away) {
+                iterate(opposite, 0, most, b, s, &a);
+                const int is_good = a.status == SLIDER_CRANK_CONVERGED && !a.is_thrown;
+                if (is_good && away_from(a.q, s->meant, s) <= reach)
+                    take(b, s, &a, &other, best);
+            }
+        }
+        if (best->status == SLIDER_CRANK_CONVERGED)
+            unwind(near, b, s, best, &other);
+    }
+}
+
+int slider_crank_assemble(const slider_crank_rough_guess *guess, double *q)
+{
+    strip b;
+    start s;
+    attempt best;
+    constants_of_strip(&b, 1);
+    for (int i = 0; i < K; i++)
+        b.p[i][0] = guess->p[i];
+    s.t = guess->t;
+    s.tolerance = guess->tolerance;
+    position_from(guess->q, guess->size, guess->max_iterations, &b, &s, &best);
+    memcpy(q, best.q, sizeof best.q);
+    return best.status;
+}
+
+#endif
 

@@ -500,7 +500,7 @@ fn started(
 ) -> Attempt {
     let (mut b, mut s, mut best) = (Point::new(), Start::new(), Attempt::new());
     (b.p, s.t, s.tolerance) = (*p, t, 1e-10);
-    start(*guess, size, 25, &mut b, &mut s, &mut best);
+    position_from(*guess, size, 25, &mut b, &mut s, &mut best);
     best
 }
 
@@ -1273,8 +1273,8 @@ fn rescue(is_sound: bool, most: usize, b: &mut Point, s: &mut Start, a: &mut Att
 }
 
 /// Find a position from a guess, or why there is none.
-fn start(guess: [f64; N_COORDINATES], size: f64, most: usize, b: &mut Point, s: &mut Start, best:
-    &mut Attempt) {
+fn position_from(guess: [f64; N_COORDINATES], size: f64, most: usize, b: &mut Point, s: &mut Start,
+    best: &mut Attempt) {
     let mut plain = Attempt::new();
     let mut a = Attempt::new();
     let mut other = Attempt::new();

@@ -556,7 +556,7 @@ def rescue(is_sound: Bool, most: Int, b: Point, s: Start, a: Attempt):
         reach += NUDGE
 
 
-def start(guess: Row[N], size: Real, most: Int, b: Point, s: Start, best: Attempt):
+def position_from(guess: Row[N], size: Real, most: Int, b: Point, s: Start, best: Attempt):
     """Find a position from a guess, or why there is none."""
     plain = Attempt()
     a = Attempt()

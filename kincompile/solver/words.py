@@ -47,7 +47,7 @@ class Mechanism:
 
 
 def on_numpy(mechanism: Mechanism, *, is_careful: bool = False) -> ModuleType:
-    """Return the texts as a module that solves a mechanism: `march`, `start`, structs."""
+    """Return the texts as a module that solves a mechanism: `march`, `position_from`, structs."""
     n, m = (mechanism.sizes[name] for name in ("N", "M"))
     sizes = {**mechanism.sizes, "TALL": m + n, "WIDE": n + 1}
     kernels = _Kernels(mechanism)

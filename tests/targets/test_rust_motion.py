@@ -6,7 +6,7 @@ import pytest
 import kincompile as kc
 from kincompile.runtime.status import Status
 from tests.targets.conftest import run_rust
-from tests.unit.solver.conftest import marched, rough_guesses, size_around, start_of
+from tests.unit.solver.conftest import marched, start_of
 
 pytestmark = pytest.mark.slow
 
@@ -109,37 +109,3 @@ def test_that_parameter_sets_end_as_each_does_alone(printed, name):
     q = numbers_in(states).reshape(3, T.size, len(CASES[name]), -1)[0]
     first = numbers_in(alone[2]).reshape(3, T.size, -1)[0]
     np.testing.assert_allclose(q[:, 0], first, rtol=0, atol=1e-9)
-
-
-# Assembles an example at t = 0: of a line the size, then the guess.
-ASSEMBLED = """macro_rules! assembled {
-    ($m:ident, $line:expr) => {
-        let numbers: Vec<f64> = $line.split(" ").map(|x| x.parse().unwrap()).collect();
-        let guess = numbers[1..].try_into().unwrap();
-        println!("{:?}", $m::assembled(0.0, &$m::DEFAULTS, guess, numbers[0]).unwrap());
-    };
-}
-"""
-
-STARTS = ("four_bar", "slider_crank", "cam_flat_follower", "rssr", "spatial_slider_crank")
-
-
-@pytest.mark.filterwarnings("ignore::kincompile.errors.AssemblyWarning")
-def test_that_rough_guesses_lead_where_the_runtime_goes(example_named, tmp_path):
-    """Turned by whole turns, and so rough that the nearer branch is not the first that is found."""
-    lines, calls, given, known = [], [], [], []
-    for name in STARTS:
-        example = example_named(name)
-        kc.emit(example.model, "rust").write(tmp_path)
-        lines.append(f"mod {name};")
-        for guess in rough_guesses(example.module, 60):
-            numbers = [size_around(example.module, guess), *guess]
-            given.append(" ".join(repr(float(x)) for x in numbers))
-            known.append(kc.solve(example.module, [0.0], guess=guess).q[0])
-        calls.append(f"for _ in 0..60 {{ assembled!({name}, lines.next().unwrap()); }}")
-    read = "let mut text = String::new(); std::io::stdin().read_to_string(&mut text).unwrap();"
-    main = ["use std::io::Read;", "fn main() {", read, "let mut lines = text.lines();", *calls, "}"]
-    rows = run_rust(tmp_path, "\n".join([*lines, ASSEMBLED, *main]), "\n".join(given))
-    for line, q in zip(rows, known, strict=True):
-        np.testing.assert_allclose(numbers_in(line), q, rtol=0, atol=1e-8)
-    assert len({tuple(np.round(q, 3)) for q in known}) > 3 * len(STARTS)

@@ -179,7 +179,7 @@ class CSolver(SolverPrinter):
             return [f"{self.kind(kind.base)} {name};"]
         if self.is_zero(node):
             return [f"double {name}[LANES] = {{ 0 }};"]
-        if len(kind.dims) == 2:
+        if kind.dims and not kind.is_lane:
             return [f"double {name}{self.dims(kind)};", *self.filled(Name(variable), value)]
         if kind.is_lane and variable not in self.here:
             return [f"{name}[lane] = {self.truth(value)};"]
@@ -189,7 +189,7 @@ class CSolver(SolverPrinter):
     def assigned(self, node: Assign) -> Lines:
         """Return the lines of an assignment."""
         target, value = node.target, node.value
-        if len(target.type.dims) == 2:
+        if target.type.dims and not target.type.is_lane:
             return self.filled(target, value)
         into = self.place(target)
         if self.inside and value.type.base == "bool" and target.type.base == "bool":
@@ -205,7 +205,7 @@ class CSolver(SolverPrinter):
         """Return what fills rows."""
         into = self.place(target)
         match value:
-            case Call("rows"):
+            case Call("row" | "rows"):
                 return []
             case Call("solve", (Name() as point, right)):
                 factors = f"{point.variable.name}{self.arrow(point)}F"
@@ -234,7 +234,7 @@ class CSolver(SolverPrinter):
 
     def counted(self, node: For) -> str:
         """Return the head of a loop over whole numbers."""
-        name, stop = node.variable.name, self.expression(node.stop)
+        name, stop = node.variable.name, self.at(node.stop, RELATION + 1)
         step = (
             "++"
             if node.step == Constant(1, node.step.type)

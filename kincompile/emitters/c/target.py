@@ -14,8 +14,8 @@ from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.printer import ELEMENTARY
 from kincompile.emitters.templates import fill
 from kincompile.quantities import nonzeros_of
-from kincompile.solver.reader import solver
-from kincompile.solver.vocabulary import COUNTS, CRITERIA
+from kincompile.solver.reader import solver, start
+from kincompile.solver.vocabulary import COUNTS, CRITERIA, START_COUNTS, START_CRITERIA
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -270,24 +270,28 @@ def _splines(program: Program) -> Iterable[str]:
 
 
 @lru_cache(maxsize=16)
-def _solver(name: str) -> str:
-    """Return the printed solver, which depends on nothing but the name of the mechanism."""
-    return CSolver(solver(), name).text()
+def _solver(name: str) -> dict[str, str]:
+    """Return printed start and march, which depend on nothing but the name of the mechanism."""
+    return {"start": CSolver(start(), name).text(), "solver": CSolver(solver(), name).text()}
 
 
 def _scales(program: Program) -> dict[str, str]:
     """Return what tells large from small in a march: kinds of coordinates, and the criteria."""
-    units = (item.unit for item in program.coordinates)
-    columns = (body.columns for body in program.bodies)
+    units = [item.unit for item in program.coordinates]
+    columns = [body.columns for body in program.bodies]
     angular = [str(int(turns)) for turns in criteria.turning(units, columns)]
+    free = [str(int(turns)) for turns in criteria.may_turn(units, columns)]
     most = max(len(program.coordinates), len(program.equations))
     probe = [repr(value) for value in criteria.probe_of(most).tolist()]
-    numbers = {name: repr(getattr(criteria, name)) for name in (*CRITERIA, *COUNTS)}
+    known = (*CRITERIA, *COUNTS, *START_CRITERIA, *START_COUNTS)
+    numbers = {name: repr(getattr(criteria, name)) for name in known}
     redundant = [str(int(name in program.redundant)) for name in program.equations]
     return {
         "angular": _array_lines(angular),
+        "may_turn": _array_lines(free),
+        "cover": _array_lines(map(str, criteria.first_of_cover(len(units), columns))),
         "probe": _array_lines(probe),
         "redundant": _array_lines(redundant),
-        "solver": _solver(program.name),
+        **_solver(program.name),
         **numbers,
     }

@@ -151,17 +151,13 @@ def _march(program: Program) -> dict[str, Any]:
     units = [item.unit for item in program.coordinates]
     columns = [body.columns for body in program.bodies]
     n, m = len(program.coordinates), len(program.equations)
-    first = [n] * n
-    for cover in criteria.covers(columns):
-        for column in cover:
-            first[column] = cover[0]
     probe = criteria.probe_of(max(n, m)).tolist()
     tables = _array("ANGULAR", "bool", n, _truths(criteria.turning(units, columns)))
     repeats = (x in program.redundant for x in program.equations)
     tables += _array("IS_REDUNDANT", "bool", m, _truths(repeats))
     tables += _array("PROBE", "f64", len(probe), wrapped(map(repr, probe)))
     tables += _array("MAY_TURN", "bool", n, _truths(criteria.may_turn(units, columns)))
-    tables += _array("COVER", "usize", n, wrapped(map(str, first)))
+    tables += _array("COVER", "usize", n, wrapped(map(str, criteria.first_of_cover(n, columns))))
     numbers = [f"const {x}: f64 = {getattr(criteria, x)!r};" for x in (*CRITERIA, *START_CRITERIA)]
     numbers += [f"const {x}: usize = {getattr(criteria, x)};" for x in (*COUNTS, *START_COUNTS)]
     numbers += [f"pub const {x}: usize = {number};" for x, number in STATUSES.items()]

@@ -25,7 +25,7 @@ def started(module, p, guess, size):
     b.p[:] = p[:, np.newaxis]
     text.constants(b, lanes=1)
     with np.errstate(all="ignore"):
-        text.start(guess, size, MAX_ITERATIONS, b, own, best)
+        text.position_from(guess, size, MAX_ITERATIONS, b, own, best)
     return best
 
 
