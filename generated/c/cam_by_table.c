@@ -1347,7 +1347,7 @@ size_t cam_by_table_march(const cam_by_table_motion *motion)
 }
 
 // The start: who brings one's own leaves it out of the library.
-#ifndef KINCOMPILE_WITHOUT_START
+#ifndef _WITHOUT_START
 
 // Which coordinates are angles or may be, and of each the first of its body's Euler parameters; N
 // where it is none.

@@ -1373,7 +1373,7 @@ size_t four_bar_march(const four_bar_motion *motion)
 }
 
 // The start: who brings one's own leaves it out of the library.
-#ifndef KINCOMPILE_WITHOUT_START
+#ifndef _WITHOUT_START
 
 // Which coordinates are angles or may be, and of each the first of its body's Euler parameters; N
 // where it is none.

@@ -1144,7 +1144,7 @@ size_t problem_3_5_6_march(const problem_3_5_6_motion *motion)
 }
 
 // The start: who brings one's own leaves it out of the library.
-#ifndef KINCOMPILE_WITHOUT_START
+#ifndef _WITHOUT_START
 
 // Which coordinates are angles or may be, and of each the first of its body's Euler parameters; N
 // where it is none.

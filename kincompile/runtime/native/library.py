@@ -40,7 +40,7 @@ COMPILERS = ("cc", "gcc", "clang")
 
 FLAGS = (
     "-std=c99", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast",
-    "-DKINCOMPILE_WITHOUT_START",
+    "-D_WITHOUT_START",
 )  # fmt: skip
 """None of these changes what a program may assume of floating-point numbers, NaN included. The
 runtime has a start of its own."""
