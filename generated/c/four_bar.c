@@ -1440,20 +1440,20 @@ typedef struct {
 // largest first, since the squares of large ones overflow.
 static void orient(start *s)
 {
-    for (int i = 0; i < N; i++)
-        if (COVER[i] == i) {
+    for (int i = 3; i < N; i++)
+        if (COVER[i] + 3 == i) {
             double most = 0.0;
             double total = 0.0;
             for (int k = 0; k < 4; k++)
-                most = fabs(s->meant[i + k]) > most ? fabs(s->meant[i + k]) : most;
+                most = fabs(s->meant[i - k]) > most ? fabs(s->meant[i - k]) : most;
             for (int k = 0; k < 4; k++) {
-                const double part = s->meant[i + k] / most;
+                const double part = s->meant[i - k] / most;
                 total += part * part;
             }
             const double rest = sqrt(total);
             if (most * rest > LONGEST_P || most * rest < 1.0 / LONGEST_P) {
                 for (int k = 0; k < 4; k++)
-                    s->meant[i + k] = s->meant[i + k] / most / rest;
+                    s->meant[i - k] = s->meant[i - k] / most / rest;
             }
         }
 }
@@ -1713,14 +1713,14 @@ static void find_way(const double *q, const double *guess, start *s)
         const double change = q[i] - guess[i];
         s->way[i] = ANGULAR[i] ? change - TURN * floor(change / TURN + 0.5) : change;
     }
-    for (int i = 0; i < N; i++)
-        if (COVER[i] == i) {
+    for (int i = 3; i < N; i++)
+        if (COVER[i] + 3 == i) {
             double along = 0.0;
             for (int k = 0; k < 4; k++)
-                along += q[i + k] * guess[i + k];
+                along += q[i - k] * guess[i - k];
             for (int k = 0; k < 4; k++) {
-                const double both = q[i + k] + guess[i + k];
-                s->way[i + k] = along < 0.0 ? both : q[i + k] - guess[i + k];
+                const double both = q[i - k] + guess[i - k];
+                s->way[i - k] = along < 0.0 ? both : q[i - k] - guess[i - k];
             }
         }
 }
@@ -1816,17 +1816,17 @@ static void unwind(const double *guess, strip *b, start *s, attempt *a, attempt 
                 memcpy(a->q, other->q, sizeof a->q);
         }
     }
-    for (int i = 0; i < N; i++)
-        if (COVER[i] == i) {
+    for (int i = 3; i < N; i++)
+        if (COVER[i] + 3 == i) {
             double along = 0.0;
             double most = 0.0;
             double trial[N];
             memcpy(trial, a->q, sizeof trial);
             for (int k = 0; k < 4; k++) {
-                const double p = a->q[i + k];
-                along += p * guess[i + k];
+                const double p = a->q[i - k];
+                along += p * guess[i - k];
                 most = fabs(p) > fabs(most) ? p : most;
-                trial[i + k] = -p;
+                trial[i - k] = -p;
             }
             const int is_turned = (fabs(along) > SAME_POSITION ? along : most) < 0.0;
             if (is_turned && place_at(trial, s->t, b) && holds(b, s))

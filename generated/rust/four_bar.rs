@@ -677,21 +677,21 @@ impl Attempt {
 /// Give the Euler parameters of the guess a length near one: any length is an orientation. By their
 /// largest first, since the squares of large ones overflow.
 fn orient(s: &mut Start) {
-    for i in 0..N_COORDINATES {
-        if COVER[i] == i {
+    for i in 3..N_COORDINATES {
+        if COVER[i] + 3 == i {
             let mut most: f64 = 0.0;
             let mut total: f64 = 0.0;
             for k in 0..4 {
-                most = if s.meant[i + k].abs() > most { s.meant[i + k].abs() } else { most };
+                most = if s.meant[i - k].abs() > most { s.meant[i - k].abs() } else { most };
             }
             for k in 0..4 {
-                let part = s.meant[i + k] / most;
+                let part = s.meant[i - k] / most;
                 total += part * part;
             }
             let rest = total.sqrt();
             if most * rest > LONGEST_P || most * rest < 1.0 / LONGEST_P {
                 for k in 0..4 {
-                    s.meant[i + k] = s.meant[i + k] / most / rest;
+                    s.meant[i - k] = s.meant[i - k] / most / rest;
                 }
             }
         }
@@ -969,15 +969,15 @@ fn find_way(q: [f64; N_COORDINATES], guess: [f64; N_COORDINATES], s: &mut Start)
         s.way[i] = if ANGULAR[i] { change
             - TURN * (change / TURN + 0.5).floor() } else { change };
     }
-    for i in 0..N_COORDINATES {
-        if COVER[i] == i {
+    for i in 3..N_COORDINATES {
+        if COVER[i] + 3 == i {
             let mut along: f64 = 0.0;
             for k in 0..4 {
-                along += q[i + k] * guess[i + k];
+                along += q[i - k] * guess[i - k];
             }
             for k in 0..4 {
-                let both = q[i + k] + guess[i + k];
-                s.way[i + k] = if along < 0.0 { both } else { q[i + k] - guess[i + k] };
+                let both = q[i - k] + guess[i - k];
+                s.way[i - k] = if along < 0.0 { both } else { q[i - k] - guess[i - k] };
             }
         }
     }
@@ -1080,16 +1080,16 @@ fn unwind(guess: [f64; N_COORDINATES], b: &mut Point, s: &mut Start, a: &mut Att
             }
         }
     }
-    for i in 0..N_COORDINATES {
-        if COVER[i] == i {
+    for i in 3..N_COORDINATES {
+        if COVER[i] + 3 == i {
             let mut along: f64 = 0.0;
             let mut most: f64 = 0.0;
             let mut trial = a.q;
             for k in 0..4 {
-                let p = a.q[i + k];
-                along += p * guess[i + k];
+                let p = a.q[i - k];
+                along += p * guess[i - k];
                 most = if p.abs() > most.abs() { p } else { most };
-                trial[i + k] = -p;
+                trial[i - k] = -p;
             }
             let is_turned = (if along.abs() > SAME_POSITION { along } else { most }) < 0.0;
             if is_turned && place_at(trial, s.t, b) && holds(b, s) {

@@ -50,19 +50,19 @@ def orient(s: Start):
 
     By their largest first, since the squares of large ones overflow.
     """
-    for i in range(N):
-        if COVER[i] == i:
+    for i in range(3, N):
+        if COVER[i] + 3 == i:
             most: Real = 0.0
             total: Real = 0.0
             for k in range(4):
-                most = abs(s.meant[i + k]) if abs(s.meant[i + k]) > most else most
+                most = abs(s.meant[i - k]) if abs(s.meant[i - k]) > most else most
             for k in range(4):
-                part = s.meant[i + k] / most
+                part = s.meant[i - k] / most
                 total += part * part
             rest = sqrt(total)
             if most * rest > LONGEST_P or most * rest < 1.0 / LONGEST_P:
                 for k in range(4):
-                    s.meant[i + k] = s.meant[i + k] / most / rest
+                    s.meant[i - k] = s.meant[i - k] / most / rest
 
 
 def place_at(q: Row[N], t: Real, b: Point) -> Bool:
@@ -291,14 +291,14 @@ def find_way(q: Row[N], guess: Row[N], s: Start):
     for i in range(N):
         change = q[i] - guess[i]
         s.way[i] = change - TURN * floor(change / TURN + 0.5) if ANGULAR[i] else change
-    for i in range(N):
-        if COVER[i] == i:
+    for i in range(3, N):
+        if COVER[i] + 3 == i:
             along: Real = 0.0
             for k in range(4):
-                along += q[i + k] * guess[i + k]
+                along += q[i - k] * guess[i - k]
             for k in range(4):
-                both = q[i + k] + guess[i + k]
-                s.way[i + k] = both if along < 0.0 else q[i + k] - guess[i + k]
+                both = q[i - k] + guess[i - k]
+                s.way[i - k] = both if along < 0.0 else q[i - k] - guess[i - k]
 
 
 def away_from(q: Row[N], guess: Row[N], s: Start) -> Real:
@@ -378,16 +378,16 @@ def unwind(guess: Row[N], b: Point, s: Start, a: Attempt, other: Attempt):
                 is_same = is_same and abs(other.q[i] - trial[i]) <= SAME_POSITION * s.reference[i]
             if is_same:
                 a.q = other.q
-    for i in range(N):
-        if COVER[i] == i:
+    for i in range(3, N):
+        if COVER[i] + 3 == i:
             along: Real = 0.0
             most: Real = 0.0
             trial = copied(a.q)
             for k in range(4):
-                p = a.q[i + k]
-                along += p * guess[i + k]
+                p = a.q[i - k]
+                along += p * guess[i - k]
                 most = p if abs(p) > abs(most) else most
-                trial[i + k] = -p
+                trial[i - k] = -p
             is_turned = (along if abs(along) > SAME_POSITION else most) < 0.0
             if is_turned and place_at(trial, s.t, b) and holds(b, s):
                 a.q = trial

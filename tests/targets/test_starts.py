@@ -55,8 +55,8 @@ def test_that_rust_ends_where_the_runtime_does(starts, example_named, tmp_path):
     for name, (guesses, sizes, ends) in starts.items():
         kc.emit(example_named(name).model, "rust").write(tmp_path)
         lines.append(f"mod {name};")
-        rows = ([size, *guess] for size, guess in zip(sizes, guesses, strict=True))
-        given += [" ".join(repr(float(x)) for x in row) for row in rows]
+        numbers = ([size, *guess] for size, guess in zip(sizes, guesses, strict=True))
+        given += [" ".join(repr(float(x)) for x in row) for row in numbers]
         known += ends
         calls.append(f"for _ in 0..{COUNT} {{ assembled!({name}, lines.next().unwrap()); }}")
     read = "let mut text = String::new(); std::io::stdin().read_to_string(&mut text).unwrap();"

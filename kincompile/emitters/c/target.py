@@ -289,7 +289,7 @@ def _scales(program: Program) -> dict[str, str]:
     return {
         "angular": _array_lines(angular),
         "may_turn": _array_lines(free),
-        "cover": _array_lines(map(str, criteria.first_of_cover(len(units), columns))),
+        "cover": _array_lines([str(k) for k in criteria.first_of_cover(len(units), columns)]),
         "probe": _array_lines(probe),
         "redundant": _array_lines(redundant),
         **_solver(program.name),
