@@ -200,6 +200,22 @@ def test_that_a_parameter_of_any_name_is_one_in_rust(every_name, tmp_path):
     assert float(lines[0]) == pytest.approx(expected_sum(every_name))
 
 
+@pytest.mark.slow
+def test_that_a_mechanism_of_any_name_is_a_module_of_rust(tmp_path):
+    modules = []
+    for name in ("fn", "self", "Self", "crate", "main", "std"):
+        m = kc.Mechanism(name)
+        arm = m.body("arm")
+        m.add(kc.Revolute("pin", arm, (0, 0), m.ground, (0, 0)))
+        m.add(kc.AbsoluteAngle("motor", arm, kc.t))
+        (path,) = kc.emit(m, target="rust").write(tmp_path)
+        assert f"`mod {path.stem};`" in path.read_text()
+        modules.append(path.stem)
+    calls = [f'println!("{{:?}}", {x}::Phi_q(&[0.0; 3], 0.0, &[])[2]);' for x in modules]
+    main = [f"mod {x};" for x in modules] + ["fn main() {", *calls, "}"]
+    assert run_rust(tmp_path, "\n".join(main)) == 6 * ["[0.0, 0.0, 1.0]"]
+
+
 def test_that_bodies_and_joints_may_have_any_name_of_c(quick_compiler):
     m = kc.Mechanism("named")
     before, offset = m.ground, m.parameter("INLINE", 0.3)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile import criteria, quantities
 from kincompile.emitters.lines import indented, quoted, wrapped
+from kincompile.emitters.naming import NameTable
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.printer import ELEMENTARY
 from kincompile.emitters.rust.dialect import RUST
@@ -49,6 +50,9 @@ KEYWORDS = (
 )  # fmt: skip
 """Words of the language, and words that it keeps for later."""
 
+CRATES = ("main", "lib", "std", "core", "alloc")
+"""Files of a program, and what every crate has: no names of a module beside them."""
+
 OWN = (
     "NAME", "FINGERPRINT", "FACTORS", "COORDINATES", "EQUATIONS", "PARAMETERS", "OUTPUTS",
     "N_COORDINATES", "N_EQUATIONS", "N_PARAMETERS", "DEFAULTS", "GUESS", *CONSTANTS,
@@ -78,6 +82,7 @@ def files(
 ) -> Mapping[str, str]:
     """Return the .rs file."""
     program, listing = code.program, schedule_solve(code, RESERVED)
+    module = NameTable((*KEYWORDS, *CRATES)).take(program.name)
     lines = [line for own in functions.values() for line in own]
     for quantity in program.quantities:
         lines += single(quantity, code)
@@ -85,6 +90,7 @@ def files(
     text = indented(lines, 0)
     fields, values = vectors(code)
     data = WRITE.facts(code, listing, text) | {
+        "module": module,
         "header": WRITE.heading(code).replace("// ", "//! ").replace("//\n", "//!\n"),
         "constants": indented(_constants(code), 0),
         "tables": indented(_tables(program), 0),
@@ -92,7 +98,7 @@ def files(
         "values": indented(values, 3),
         "march": "" if listing is None else fill("rust/march.rs.jinja", _march(program)),
     }
-    return {f"{program.name}.rs": fill("rust/module.rs.jinja", data)}
+    return {f"{module}.rs": fill("rust/module.rs.jinja", data)}
 
 
 def _constants(code: InlineProgram) -> list[str]:
