@@ -41,6 +41,13 @@ ROUNDING = 16 * float(np.finfo(np.float64).eps)
 """Part of a coordinate, or of the terms of an equation, below which floating point has no more to
 give."""
 
+SLIGHT = 1e-6
+"""Part of a whole that is nothing where it was worked out by differences, roots or ranks."""
+
+FARTHEST = SLIGHT / ROUNDING
+"""Distance from zero, in scales, up to which coordinates loosen the equations by what rounding
+leaves of them: what is left of more is no position, and a guess may stand anywhere."""
+
 MAX_ITERATIONS = 25
 """Iterations from a guess after which an attempt is given up."""
 
@@ -120,9 +127,6 @@ of the largest residual, of a movement."""
 
 HALF = 1e-8
 """Part of a number that leaves half of its digits: up to it two that were solved for agree."""
-
-SLIGHT = 1e-6
-"""Part of a whole that is nothing where it was worked out by differences, roots or ranks."""
 
 NEAR_MISS = 1e-3
 """What equations are missed by, relative to their terms, where they may hold after all."""

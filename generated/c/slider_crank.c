@@ -778,9 +778,10 @@ static const double SMALL_ERROR = 0.05, TOO_NEAR = 100000.0;
 // velocity, times the step, is a few times that of the position. Below SMOOTH rounding decides.
 static const double NEARLY_SINGULAR = 30.0, KINK = 8.0, SMOOTH = 1e-09;
 // How much larger than the tolerance, relative to its terms, a residual may be at the end; what
-// rounding leaves; the part of the way between two times below which a step is not halved.
+// rounding leaves, and up to which distance from zero it counts; the part of the way between two
+// times below which a step is not halved.
 static const double RESIDUAL_FACTOR = 10.0, ROUNDING = 3.552713678800501e-15;
-static const double SMALLEST_PART = 9.5367431640625e-07;
+static const double FARTHEST = 281474976.710656, SMALLEST_PART = 9.5367431640625e-07;
 // Part of its terms by which an equation of Phi_q x = b may miss its right side.
 static const double SOLVED = 1e-10;
 // The same of equations that repeat others, and which these are.
@@ -894,7 +895,9 @@ static void measure(strip *b, double size, scales *s, size_t lanes)
         for (size_t lane = 0; lane < lanes; lane++) {
             const double slope = fabs(b->Phi_q[e][lane]);
             s->magnitude[i][lane] += slope * s->reference[j][lane];
-            s->noise[i][lane] += ROUNDING * slope * (s->reference[j][lane] + fabs(q[j][lane]));
+            const double most = FARTHEST * s->reference[j][lane];
+            const double place = fabs(q[j][lane]) < most ? fabs(q[j][lane]) : most;
+            s->noise[i][lane] += ROUNDING * slope * (s->reference[j][lane] + place);
         }
     }
     for (int i = 0; i < M; i++) {

@@ -79,12 +79,12 @@ for cover = m.covers
     end
 end
 m.guess = guess;
-m.place = abs(guess);
 part = mod((1:9).' * (sqrt(5) - 1) / 2, 1);
 m.probe = (1 - 2 * (mod(64 * part, 2) >= 1)) .* (1 + part) / 2;  % without a pattern
 extent = double(single(extent_of(m)));
 m.reference = m.is_angle + ~m.is_angle * (extent + (extent == 0));
 m.near = m.reference .* (m.is_angle * 0.5235987755982988 + ~m.is_angle * 0.1);
+m.place = min(abs(guess), 281474976.710656 * m.reference);
 m.floor = 3.552713678800501e-15 * max([0; m.place(~m.is_angle) ./ m.reference(~m.is_angle)]);
 m.magnitude = zeros(9, 1);
 m.noise = zeros(9, 1);
@@ -108,7 +108,7 @@ extent = max([0; arms(isfinite(arms))]);
 if extent > 0
     return
 end
-farthest = max([0; m.place(~m.is_angle)]);
+farthest = max([0; abs(m.guess(~m.is_angle))]);
 farthest = farthest + (farthest == 0);
 step = 1e-08 * farthest;
 near = bends(m, m.guess, step);

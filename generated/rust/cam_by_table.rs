@@ -387,6 +387,7 @@ const COVER: [usize; 7] = [
 // By what a march judges, and what became of a point.
 const AGREEMENT: f64 = 1e-06;
 const BEFORE_LOCK_UP: f64 = 0.0001;
+const FARTHEST: f64 = 281474976.710656;
 const GROWN: f64 = 8.0;
 const KINK: f64 = 8.0;
 const LEFT: f64 = 64.0;
@@ -718,7 +719,7 @@ fn judge_around(q: [f64; N_COORDINATES], size: f64, b: &mut Point, s: &mut Start
     for i in 0..N_COORDINATES {
         s.reference[i] = if ANGULAR[i] { 1.0 } else { size };
         s.near[i] = if ANGULAR[i] { NEAR_ANGLE } else { NEAR_PART * size };
-        s.place[i] = q[i].abs();
+        s.place[i] = q[i].abs().min(FARTHEST * s.reference[i]);
         generic[i] = q[i] + s.reference[i] * PROBE[i];
         wide[i] = s.reference[i] + s.place[i];
         if !ANGULAR[i] && s.place[i] > farthest {
@@ -1421,7 +1422,9 @@ fn measure(b: &mut Point, size: f64, s: &mut Scales) {
         let j = PATTERN[e][1];
         let mut slope = b.Phi_q[e].abs();
         s.magnitude[i] += slope * s.reference[j];
-        s.noise[i] += ROUNDING * slope * (s.reference[j] + q[j].abs());
+        let mut most = FARTHEST * s.reference[j];
+        let mut place = if q[j].abs() < most { q[j].abs() } else { most };
+        s.noise[i] += ROUNDING * slope * (s.reference[j] + place);
     }
     for i in 0..N_EQUATIONS {
         let allowed = if IS_REDUNDANT[i] { AGREEMENT } else { SOLVED };

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import ROUNDING, STEEP, probe_of, rounded, size_of
+from kincompile.criteria import FARTHEST, ROUNDING, STEEP, probe_of, rounded, size_of
 from kincompile.runtime.engine.code import Array, Compiled, code_of
 from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.engine.scales import Scales
@@ -66,7 +66,7 @@ def measured(
     reference = np.where(angular, 1.0, size)
     if isinstance(engine, Sparse):
         engine.reference = reference
-    place, probe = np.abs(q), probe_of(m)
+    place, probe = np.minimum(np.abs(q), FARTHEST * reference), probe_of(m)
     floor = float(ROUNDING * (place[~angular] / size).max(initial=0.0))
     none = np.zeros(m)
     equations = Problem(

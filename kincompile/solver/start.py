@@ -97,7 +97,7 @@ def judge_around(q: Row[N], size: Real, b: Point, s: Start):
     for i in range(N):
         s.reference[i] = 1.0 if ANGULAR[i] else size
         s.near[i] = NEAR_ANGLE if ANGULAR[i] else NEAR_PART * size
-        s.place[i] = abs(q[i])
+        s.place[i] = min(abs(q[i]), FARTHEST * s.reference[i])
         generic[i] = q[i] + s.reference[i] * PROBE[i]
         wide[i] = s.reference[i] + s.place[i]
         if not ANGULAR[i] and s.place[i] > farthest:

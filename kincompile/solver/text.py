@@ -106,7 +106,9 @@ def measure(b: Point, size: Real, s: Scales):
         j = PATTERN[e][1]
         slope = abs(b.Phi_q[e])
         s.magnitude[i] += slope * s.reference[j]
-        s.noise[i] += ROUNDING * slope * (s.reference[j] + abs(q[j]))
+        most = FARTHEST * s.reference[j]
+        place = where(abs(q[j]) < most, abs(q[j]), most)
+        s.noise[i] += ROUNDING * slope * (s.reference[j] + place)
     for i in range(M):
         allowed = AGREEMENT if IS_REDUNDANT[i] else SOLVED
         if IS_CAREFUL:

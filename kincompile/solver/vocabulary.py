@@ -36,7 +36,7 @@ STATUSES = {
 """What becomes of a point, and the numbers that say so in all languages."""
 
 CRITERIA = (
-    "AGREEMENT", "BEFORE_LOCK_UP", "GROWN", "KINK", "LEFT", "NEARLY_SINGULAR",
+    "AGREEMENT", "BEFORE_LOCK_UP", "FARTHEST", "GROWN", "KINK", "LEFT", "NEARLY_SINGULAR",
     "RESIDUAL_FACTOR", "ROUNDING", "SMALL_ERROR", "SMALLEST_PART", "SMOOTH", "SOLVED",
     "TOO_NEAR",
 )  # fmt: skip

@@ -71,7 +71,7 @@ class Problem {
         this.reference = Float64Array.from(this.angular, isAngle => (isAngle ? 1 : this.size));
         // How far each coordinate of a guess may be from an assembly that it is near.
         this.near = this.reference.map((x, k) => x * (this.angular[k] ? NEAR_ANGLE : NEAR_PART));
-        this.place = Float64Array.from(q, Math.abs);
+        this.place = this.reference.map((x, k) => Math.min(Math.abs(q[k]), FARTHEST * x));
         this.floor = ROUNDING * largest(this.place.filter((_, k) => !this.angular[k])) / this.size;
         this.probe = probeOf(m);
         this.magnitude = new Float64Array(m);

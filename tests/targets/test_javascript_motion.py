@@ -12,6 +12,7 @@ from kincompile import spatial
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.observed import observed
+from kincompile.runtime.status import Status
 
 from .conftest import CHROMIUM, NODE, SPACE, in_chromium, in_node
 
@@ -216,6 +217,19 @@ def test_that_rough_guesses_lead_where_the_runtime_goes(solved, example_named, n
         np.testing.assert_allclose(q, known.q[0], atol=1e-8 * equations.size)
         ways.add(tuple(np.round(known.q[0] - start, 3)))
     assert len(ways) > 3
+
+
+def test_that_a_guess_as_far_as_numbers_go_loosens_no_equation(solved, example_named):
+    model, module = example_named("four_bar").model, example_named("four_bar").module
+    angular = np.array([module.UNITS[name] == "rad" for name in module.COORDINATES])
+    jobs = [
+        [[0.0], module.DEFAULTS.tolist(), (module.GUESS + 10.0**power * moved).tolist()]
+        for power in (11, 13, 16, 100, 300)
+        for moved in (angular, ~angular)
+    ]
+    for found, _ in solved(model, jobs):
+        if found["status"] == [Status.CONVERGED]:
+            np.testing.assert_allclose(module.Phi(np.array(found["q"]), 0.0), 0, atol=1e-4)
 
 
 def test_that_corners_of_drivers_have_their_status(solved):

@@ -1,5 +1,7 @@
 """From a rough guess: the assembly beside it, on all targets, without turns that nobody meant."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -57,3 +59,20 @@ def test_free_turns_are_those_of_the_guess(turns):
     coupled.add(kc.RelativeAngle("belt", one, two, 0.5))
     q = kc.newton(kc.compile(coupled), 0.0, None).q  # no turn of these is free
     np.testing.assert_allclose(q, [0, 0, 100, 3, 0, 100.5], atol=1e-9)
+
+
+@pytest.mark.parametrize("option", [{}, {"form": "grouped"}, {"target": "c"}], ids=str)
+def test_a_guess_as_far_as_numbers_go_loosens_no_equation(option, quick_compiler):
+    """Rounding errors of the place of a guess are no excuse for those of a position."""
+    linkage = random_linkage(np.random.default_rng(3), 1)
+    module = kc.compile(linkage.mechanism, **option)
+    angular = np.array([module.UNITS[name] == "rad" for name in module.COORDINATES])
+    for power in (11, 13, 16, 100, 300):
+        for moved in (angular, ~angular):
+            guess = np.array(linkage.q) + 10.0**power * moved
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # another assembly is as near
+                found = kc.solve(module, np.linspace(0, 0.01, 3), guess=guess)
+            assert found.good.all() or not found.good.any()
+            for q, t in zip(found.q[found.good], found.t[found.good], strict=True):
+                np.testing.assert_allclose(module.Phi(q, t), 0, atol=1e-5)
