@@ -1269,7 +1269,7 @@ static void judge_around(const double *q, double size, strip *b, start *s)
     for (int i = 0; i < N; i++) {
         s->reference[i] = ANGULAR[i] ? 1.0 : size;
         s->near[i] = ANGULAR[i] ? NEAR_ANGLE : NEAR_PART * size;
-        s->place[i] = fabs(q[i]);
+        s->place[i] = fmin(fabs(q[i]), FARTHEST * s->reference[i]);
         generic[i] = q[i] + s->reference[i] * PROBE[i];
         wide[i] = s->reference[i] + s->place[i];
         if (!ANGULAR[i] && s->place[i] > farthest)

@@ -343,20 +343,20 @@ const cam_by_table = (() => {
         const AGREEMENT = 1e-06, ALLOWED_PART = 0.25, ARC_CORRECTIONS = 12, AROUND = 0.002,
             AROUND_OFFSETS = [-2.0, -1.0, 1.0, 2.0], ASSEMBLED = 1e-09, ASTRAY = 5.0, AS_NEAR = 1.1,
             AT_EVENT = 1e-09, BEND = 0.01, BESIDE = [0.0, -1e-08, 1e-08, -1e-06, 1e-06, -1e-05],
-            CONSTANT = 1e-12, CORNER = 1e-09, FAR = 0.7853981633974483, FIRST_ARC = 0.01,
-            FOLDED = 1e-09, INVOLVED = 0.02, IN_RANGE = 1e-06, KINK = 8.0, LARGEST_ANGLE = 0.5,
-            LARGE_ERROR = 0.5, LATE = 1e-06, LONGEST_ARC = 0.05, LONGEST_P = 2.0, MAX_ARCS = 400,
-            MAX_CORRECTIONS = 6, MAX_ITERATIONS = 25, MAX_SUBSTEPS = 10000, MIRRORED = 2.0,
-            MIRROR_STEP = 1e-05, MOST_MIRRORED = 300, MOST_TURNED = 300, NEARLY_SINGULAR = 30.0,
-            NEAR_ANGLE = 0.5235987755982988, NEAR_PART = 0.1, NUDGE = 0.3, OTHER_SIZE = 100.0,
-            PATIENCE = 8, RESIDUAL_FACTOR = 10.0, RESTARTS = 4, ROOT_LENGTH = 1e-13, ROOT_STEPS = 80,
-            ROUNDING = 3.552713678800501e-15, SAME_POSITION = 1e-06, SAME_TIME = 8.881784197001252e-16,
-            SETTLED = 0.5, SHORTEST_ARC = 1e-09, SHORTEST_STEP = 9.5367431640625e-07,
-            SINGULAR_SENSITIVITY = 10000000.0, SMALLEST_PART = 9.5367431640625e-07,
-            SMALL_CORRECTION = 1e-12, SMALL_ERROR = 0.05, SMALL_PART = 1e-08, SMOOTH = 1e-09,
-            SOLVED = 1e-10, SPATIAL_COORDINATES = 7, STEEP = 1000000.0, STRAIGHT = 0.98,
-            SUFFICIENT = 0.0001, THROWN = 10.0, TINY = 1e-300, TOLERABLE_CORRECTION = 1e-07,
-            TOLERANCE = 1e-10, TOO_NEAR = 100000.0, WILD = 1000.0;
+            CONSTANT = 1e-12, CORNER = 1e-09, FAR = 0.7853981633974483, FARTHEST = 281474976.710656,
+            FIRST_ARC = 0.01, FOLDED = 1e-09, INVOLVED = 0.02, IN_RANGE = 1e-06, KINK = 8.0,
+            LARGEST_ANGLE = 0.5, LARGE_ERROR = 0.5, LATE = 1e-06, LONGEST_ARC = 0.05, LONGEST_P = 2.0,
+            MAX_ARCS = 400, MAX_CORRECTIONS = 6, MAX_ITERATIONS = 25, MAX_SUBSTEPS = 10000,
+            MIRRORED = 2.0, MIRROR_STEP = 1e-05, MOST_MIRRORED = 300, MOST_TURNED = 300,
+            NEARLY_SINGULAR = 30.0, NEAR_ANGLE = 0.5235987755982988, NEAR_PART = 0.1, NUDGE = 0.3,
+            OTHER_SIZE = 100.0, PATIENCE = 8, RESIDUAL_FACTOR = 10.0, RESTARTS = 4, ROOT_LENGTH = 1e-13,
+            ROOT_STEPS = 80, ROUNDING = 3.552713678800501e-15, SAME_POSITION = 1e-06,
+            SAME_TIME = 8.881784197001252e-16, SETTLED = 0.5, SHORTEST_ARC = 1e-09,
+            SHORTEST_STEP = 9.5367431640625e-07, SINGULAR_SENSITIVITY = 10000000.0,
+            SMALLEST_PART = 9.5367431640625e-07, SMALL_CORRECTION = 1e-12, SMALL_ERROR = 0.05,
+            SMALL_PART = 1e-08, SMOOTH = 1e-09, SOLVED = 1e-10, SPATIAL_COORDINATES = 7,
+            STEEP = 1000000.0, STRAIGHT = 0.98, SUFFICIENT = 0.0001, THROWN = 10.0, TINY = 1e-300,
+            TOLERABLE_CORRECTION = 1e-07, TOLERANCE = 1e-10, TOO_NEAR = 100000.0, WILD = 1000.0;
         const N = N_COORDINATES, M = N_EQUATIONS, NONZEROS = PATTERN.length;
         const BLOCKS = point().determinants.length, PROBE = probeOf(Math.max(N, M));
 
@@ -562,7 +562,7 @@ const cam_by_table = (() => {
                 this.reference = Float64Array.from(this.angular, isAngle => (isAngle ? 1 : this.size));
                 // How far each coordinate of a guess may be from an assembly that it is near.
                 this.near = this.reference.map((x, k) => x * (this.angular[k] ? NEAR_ANGLE : NEAR_PART));
-                this.place = Float64Array.from(q, Math.abs);
+                this.place = this.reference.map((x, k) => Math.min(Math.abs(q[k]), FARTHEST * x));
                 this.floor = ROUNDING * largest(this.place.filter((_, k) => !this.angular[k])) / this.size;
                 this.probe = probeOf(m);
                 this.magnitude = new Float64Array(m);

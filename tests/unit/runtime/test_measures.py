@@ -9,6 +9,7 @@ import sympy
 
 import kincompile as kc
 from kincompile import outputs
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.results import between
 from kincompile.runtime.results.measures import measures_together
 
@@ -275,11 +276,13 @@ def test_measures_of_variants_together_are_those_of_each_alone(monkeypatch):
     monkeypatch.setattr(between.ObservedMotion, "look", counted)
     ones = [several.variant(number) for number in range(7)]
     sets = starts[:, np.newaxis]
-    found = measures_together(ones, several.require_module(""), sets, ("travel", "speed", "pull"))
+    found = measures_together(
+        ones, code_of(several.require_module("")), sets, ("travel", "speed", "pull")
+    )
     count = len(looks)
     for number, start in enumerate(starts.tolist()):
         alone = slider_crank(1.3, 53, start=start).measures().outputs
-        wanted = [item for item in alone if item.name in ("travel", "speed", "pull")]
+        wanted = [item for item in alone if item.name in names]
         for got, one in zip(found[number], wanted, strict=True):
             assert (got.name, got.period is None) == (one.name, one.period is None)
             for name in ("least", "greatest", "mean", "rms", "dead_points", "period"):
