@@ -276,9 +276,8 @@ def test_measures_of_variants_together_are_those_of_each_alone(monkeypatch):
     monkeypatch.setattr(between.ObservedMotion, "look", counted)
     ones = [several.variant(number) for number in range(7)]
     sets = starts[:, np.newaxis]
-    found = measures_together(
-        ones, code_of(several.require_module("")), sets, ("travel", "speed", "pull")
-    )
+    code, names = code_of(several.require_module("")), ("travel", "speed", "pull")
+    found = measures_together(ones, code, sets, names)
     count = len(looks)
     for number, start in enumerate(starts.tolist()):
         alone = slider_crank(1.3, 53, start=start).measures().outputs
