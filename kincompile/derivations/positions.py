@@ -9,6 +9,7 @@ import numpy as np
 
 from kincompile.criteria import probe_of
 from kincompile.errors import KincompileError
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.newton import NewtonResult, newton
 from kincompile.runtime.problem import problem
 from kincompile.runtime.solve import solve
@@ -80,4 +81,4 @@ def _leads(result: NewtonResult, q: Array, scales: Array) -> bool:
 
 def _scales(module: ModuleType, q: Array, t: float) -> Array:
     with np.errstate(all="ignore"):
-        return problem(module, module.DEFAULTS, q, t).reference
+        return problem(code_of(module), module.DEFAULTS, q, t).reference

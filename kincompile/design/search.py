@@ -23,7 +23,7 @@ from kincompile.errors import KincompileWarning
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, all_hold
-from kincompile.runtime.problem import measured
+from kincompile.runtime.problem import problem
 from kincompile.runtime.results.observed import observed
 from kincompile.runtime.solve import solve
 
@@ -172,7 +172,7 @@ class Search:
         if code.redundant:
             return self._through_with_care(sets, guess)
         with np.errstate(all="ignore"):
-            equations = measured(code, sets[0], guess, times[0])
+            equations = problem(code, sets[0], guess, times[0])
             march = March(equations, Planned(code, np.ascontiguousarray(sets.T)), TOLERANCE)
             q = np.repeat(guess[:, np.newaxis], len(sets), axis=1)
             found = march.correct_together(q, times[0], MAX_ITERATIONS)

@@ -52,7 +52,7 @@ def first_position(inputs: Inputs) -> tuple[Inputs, Begin]:
     time = float(inputs.t[0])
     for p in (inputs.p, np.array(inputs.code.module.DEFAULTS, dtype=np.float64)):
         own = replace(inputs, p=p)
-        equations = problem(inputs.code.module, p, inputs.guess, time)
+        equations = problem(inputs.code, p, inputs.guess, time)
         march = March(equations, equations.engine, inputs.tolerance)
         together = own.code.lanes is not None
         outcome = start(march, time, own, is_in_vain=together)
@@ -64,7 +64,7 @@ def first_position(inputs: Inputs) -> tuple[Inputs, Begin]:
         if found is not None and found.sensitivity <= TOO_NEAR:
             begin = found.point.q
             return replace(own, guess=begin), Begin(equations, begin, is_assembled=True)
-    equations = problem(inputs.code.module, inputs.p, inputs.guess, time)
+    equations = problem(inputs.code, inputs.p, inputs.guess, time)
     return inputs, Begin(equations, inputs.guess, is_assembled=False)
 
 
@@ -97,7 +97,7 @@ def is_elsewhere(equations: Problem, q: Array, begin: Array) -> Any:
 def leaves(begin: Begin, own: Inputs, q: Array) -> bool:
     """Say whether a position of a set is on another branch than all start from."""
     t = float(own.t[0])
-    there, here = begin.equations.at(begin.q, t), problem(own.code.module, own.p, q, t)
+    there, here = begin.equations.at(begin.q, t), problem(own.code, own.p, q, t)
     found = here.at(q, t)
     if there is None or found is None:
         return True
@@ -137,7 +137,7 @@ class Sets:
     def alone(self, variant: int, q: Array) -> March:
         """Return the march of one of them."""
         inputs, time = self.inputs, float(self.inputs.t[0])
-        equations = problem(inputs.code.module, self.p[variant], q, time)
+        equations = problem(inputs.code, self.p[variant], q, time)
         return March(equations, equations.engine, inputs.tolerance)
 
     def strays(self, variants: Places, q: Array) -> Mask:

@@ -15,7 +15,7 @@ from kincompile.runtime.engine.scales import Point
 from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
 from kincompile.runtime.march import March, Outcome, State
-from kincompile.runtime.problem import measured
+from kincompile.runtime.problem import problem
 from kincompile.runtime.singular.events import (
     DOUBTS,
     branch_switch,
@@ -282,7 +282,7 @@ class _Way:
     ) -> March:
         """Return the march of the mechanism, whose scales are those at a position."""
         inputs, time = self._inputs, float(self._times[0]) if t is None else t
-        equations = measured(inputs.code, inputs.p, q, time, sparse=True, engine=engine)
+        equations = problem(inputs.code, inputs.p, q, time, sparse=True, engine=engine)
         return March(equations, equations.engine, inputs.tolerance)
 
     def _leave_blocks(self, q: NDArray[np.float64]) -> None:

@@ -13,7 +13,7 @@ from kincompile.errors import InputError
 from kincompile.html import Shown
 from kincompile.runtime.engine.scales import norm
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.problem import measured
+from kincompile.runtime.problem import problem
 from kincompile.runtime.start import assemble
 from kincompile.tables import counted, indented, table
 
@@ -115,7 +115,7 @@ def newton(
         raise InputError(f"newton works at one time, got {inputs.t.size}: use solve for a grid.")
     with np.errstate(all="ignore"):
         time = float(inputs.t[0])
-        equations = measured(inputs.code, inputs.p, inputs.guess, time)
+        equations = problem(inputs.code, inputs.p, inputs.guess, time)
         attempt = assemble(equations, time, inputs.guess, inputs.tolerance, inputs.max_iterations)
     return _result(attempt, inputs.guess)
 

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import FARTHEST, ROUNDING, STEEP, probe_of, rounded, size_of
-from kincompile.runtime.engine.code import Array, Compiled, code_of
 from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.engine.scales import Scales
 from kincompile.runtime.engine.sparse import Sparse
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
+    from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.engine.linear import Linear
     from kincompile.runtime.engine.scales import Point
 
@@ -34,12 +32,7 @@ class Problem(Scales):
         return point if math.isfinite(point.Phi.sum()) else None
 
 
-def problem(module: ModuleType, p: Array, q: Array, t: float) -> Problem:
-    """Return the equations of a module that somebody holds; see `measured`."""
-    return measured(code_of(module), p, q, t)
-
-
-def measured(
+def problem(
     code: Compiled,
     p: Array,
     q: Array,

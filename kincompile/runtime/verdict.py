@@ -12,7 +12,7 @@ import numpy as np
 from kincompile.criteria import LATE, MAX_SUBSTEPS, ZERO
 from kincompile.errors import BranchSwitchWarning, SingularConfigurationWarning
 from kincompile.names import listed
-from kincompile.runtime.problem import measured
+from kincompile.runtime.problem import problem
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.singular.assemblies import unchosen
 from kincompile.runtime.singular.reach import impossible, missed
@@ -93,7 +93,7 @@ def start_of_first(inputs: Inputs, solution: Solution) -> str:
     if solution.status[0, 0] != Status.CONVERGED:
         return ""
     q, time = solution.q[0, 0].copy(), float(inputs.t[0])
-    equations = measured(inputs.code, inputs.p, inputs.guess, time)
+    equations = problem(inputs.code, inputs.p, inputs.guess, time)
     guess, found = (equations.at(position, time) for position in (inputs.guess, q))
     return unchosen(inputs, q, bool(guess and found and is_folded(equations, guess, found)))
 
@@ -193,7 +193,7 @@ def _asked(inputs: Inputs, outcome: Outcome) -> str:
 
 
 def _equations_at(inputs: Inputs, point: Point) -> Problem:
-    return measured(inputs.code, inputs.p, point.q, point.t)
+    return problem(inputs.code, inputs.p, point.q, point.t)
 
 
 def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str:

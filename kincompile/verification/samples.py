@@ -14,7 +14,7 @@ from kincompile.quantities import OF_EQUATIONS, TOGETHER, functions, states_of
 from kincompile.runtime.corrector import nearest
 from kincompile.runtime.engine.code import read
 from kincompile.runtime.newton import newton
-from kincompile.runtime.problem import measured
+from kincompile.runtime.problem import problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def samples_of(module: ModuleType) -> Samples:
     random = np.random.default_rng(SEED)
     code = read(module)  # as it is now: a function may have been replaced since it was loaded
     guess, defaults = code.guess, code.defaults
-    reference = measured(code, defaults, guess, 0.0).reference
+    reference = problem(code, defaults, guess, 0.0).reference
     spread = _spread(code, reference)
     generic, assembled = [], []
     for _ in range(STATES):
@@ -150,7 +150,7 @@ def _assembled(code: Compiled, near: Array, t: float) -> Array | None:
     if not code.unsolvable and len(code.equations) >= near.size:
         found = newton(code.module, t, code.guess)
         return found.q if found.status is Status.CONVERGED else None
-    attempt = nearest(measured(code, code.defaults, near, t), t, near)
+    attempt = nearest(problem(code, code.defaults, near, t), t, near)
     return attempt.last.q if attempt.status is Status.CONVERGED else None
 
 

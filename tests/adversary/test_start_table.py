@@ -17,6 +17,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.criteria import SAME_POSITION
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.problem import problem
 from tests.adversary.test_starts import SHARE, in_javascript, in_octave, needs_node
 from tests.targets.conftest import OCTAVE
@@ -61,7 +62,7 @@ class Row:
 def random_guesses(module, random, count):
     """Return guesses near an assembly and far from it, with whole turns and any orientation."""
     exact = kc.newton(module, 0.0, None).q
-    equations = problem(module, module.DEFAULTS, exact, 0.0)
+    equations = problem(code_of(module), module.DEFAULTS, exact, 0.0)
     is_near = np.arange(count)[:, np.newaxis] % 2 == 1
     away = random.uniform(-1, 1, (count, exact.size)) * np.where(is_near, 0.5, np.pi)
     away[:, ~equations.angular] *= equations.size / 5
@@ -79,7 +80,7 @@ def random_guesses(module, random, count):
 
 def rows(name, module, guesses, found):
     """Return what was found, pairs of a status and a position, as rows."""
-    equations = problem(module, module.DEFAULTS, guesses[0], 0.0)
+    equations = problem(code_of(module), module.DEFAULTS, guesses[0], 0.0)
     known: list[np.ndarray] = []
     for guess, (status, q) in zip(guesses, found, strict=True):
         number, reached = 0, ()

@@ -16,6 +16,7 @@ import pytest
 import kincompile as kc
 from kincompile.emitters.templates import read
 from kincompile.runtime.corrector import iterate
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.problem import problem
 from kincompile.view.page_scripts import solver_script
 from tests.adversary.chains import (
@@ -214,7 +215,9 @@ def test_two_hundred_bad_starts_on_the_page(tmp_path, record):
         starts = json.dumps(guesses.tolist())
         result = f"{starts}.map(g => newton.iterate(emitted, g, 0))"
         for guess, found in zip(guesses, under_node(tmp_path, text, result), strict=True):
-            known = iterate(problem(module, module.DEFAULTS, guess, 0.0), 0.0, guess, 1e-10, 25)
+            known = iterate(
+                problem(code_of(module), module.DEFAULTS, guess, 0.0), 0.0, guess, 1e-10, 25
+            )
             tried += 1
             if max(known.corrections, default=0.0) > np.pi:  # thrown far: roundings decide where
                 thrown += 1

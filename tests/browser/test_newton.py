@@ -9,6 +9,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.runtime.corrector import iterate
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.problem import problem
 
 EXAMPLES = ("four_bar", "slider_crank", "wrecker_boom", "cam_flat_follower", "problem_3_5_6")
@@ -70,7 +71,7 @@ def test_that_the_page_iterates_as_the_runtime_does(
         text = f"newton.iterate(emitted, {json.dumps(guess.tolist())}, {TIME}).iterates"
         found = page.evaluate(f"{text}.map(iterate => iterate.q)")
         points = iterate(
-            problem(module, module.DEFAULTS, guess, TIME), TIME, guess, 1e-10, 25
+            problem(code_of(module), module.DEFAULTS, guess, TIME), TIME, guess, 1e-10, 25
         ).points
         np.testing.assert_allclose(found, [point.q for point in points], rtol=1e-9, atol=1e-9)
     page.close()
@@ -113,7 +114,7 @@ def test_that_corrections_and_residuals_are_those_of_the_runtime(
     page = open_panel("four_bar")
     to_the_end(page)
     guess = module.GUESS
-    attempt = iterate(problem(module, module.DEFAULTS, guess, 0.0), 0.0, guess, 1e-10, 25)
+    attempt = iterate(problem(code_of(module), module.DEFAULTS, guess, 0.0), 0.0, guess, 1e-10, 25)
     rows = page.locator(".newton .iterations tbody tr")
     for k, point in enumerate(attempt.points[:-1]):
         cells = rows.nth(k).locator("td").all_inner_texts()

@@ -63,7 +63,7 @@ def compare(found, event, solution):
     outputs = observed(code_of(module), motion, solution.t, p)
     if np.isfinite(solution.q[0]).all():
         with np.errstate(all="ignore"):  # as while it solves
-            equations = problem(module, p, solution.q[0].copy(), solution.t[0])
+            equations = problem(code_of(module), p, solution.q[0].copy(), solution.t[0])
         scales = np.array([equations.size]), equations.magnitude, equations.noise
         for values, known in zip(found["scales"], scales, strict=True):
             np.testing.assert_allclose(values, known, rtol=1e-6)
@@ -204,7 +204,7 @@ def test_that_rough_guesses_lead_where_the_runtime_goes(solved, example_named, n
     """Turned by whole turns, and so rough that the nearer branch is not the first that is found."""
     model, module = example_named(name).model, example_named(name).module
     start = example_named(name).solution.q[0]
-    equations = problem(module, module.DEFAULTS, start.copy(), 0.0)
+    equations = problem(code_of(module), module.DEFAULTS, start.copy(), 0.0)
     rng = np.random.default_rng(7)
     guesses = start + equations.reference * rng.uniform(-0.8, 0.8, (60, start.size))
     guesses[::2] += equations.angular * 2 * np.pi * rng.integers(-2, 3, (30, start.size))

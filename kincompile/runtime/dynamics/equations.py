@@ -11,7 +11,7 @@ from kincompile.errors import InputError
 from kincompile.names import without_loads
 from kincompile.runtime.engine.code import DYNAMICS, SLOPES
 from kincompile.runtime.engine.dense import powers_of_rows
-from kincompile.runtime.problem import measured
+from kincompile.runtime.problem import problem
 from kincompile.runtime.statics.balance import STEP
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class Equations:
 
     def measure_at(self, q: Array, t: float) -> None:
         """Take the scales of coordinates and equations from a position."""
-        self.joints = measured(self.code, self.parameters, q, t)
+        self.joints = problem(self.code, self.parameters, q, t)
 
     @property
     def scale(self) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from kincompile.criteria import MAX_CORRECTIONS, SLIGHT, TOLERANCE
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, State, all_hold
-from kincompile.runtime.problem import measured
+from kincompile.runtime.problem import problem
 from kincompile.runtime.singular.events import quintic
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ class ObservedMotion:
     def march(self) -> March:
         """What follows the motion."""
         start = self.position(0)
-        equations = measured(self._code, self.p, start, self.t[0], sparse=True)
+        equations = problem(self._code, self.p, start, self.t[0], sparse=True)
         return March(equations, equations.engine, TOLERANCE)
 
     def nearest(self, t: float) -> int:

@@ -14,7 +14,7 @@ import numpy as np
 
 from kincompile.names import listed
 from kincompile.runtime.engine.code import DRIVERS
-from kincompile.runtime.problem import measured
+from kincompile.runtime.problem import problem
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.singular.events import BIFURCATION, LOCK_UP, involved
 from kincompile.runtime.singular.reach import freed_curve
@@ -112,7 +112,7 @@ def driver_ranges(solution: MotionTable, code: Compiled, p: Array) -> tuple[Driv
     if DRIVERS not in code.makers or not is_square or not np.isfinite(solution.q_ddot[0]).all():
         return ()
     with np.errstate(all="ignore"):
-        equations = measured(code, p, q, t)
+        equations = problem(code, p, q, t)
         drivers = [Driver(*item) for item in code.request(DRIVERS)(t, p)]
         return tuple(_range(equations, driver, q, t) for driver in drivers)
 

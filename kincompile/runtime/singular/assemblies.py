@@ -13,7 +13,7 @@ from kincompile.names import listed
 from kincompile.runtime.corrector import iterate, safeguarded_step
 from kincompile.runtime.engine.scales import norm
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.problem import measured
+from kincompile.runtime.problem import problem
 from kincompile.runtime.start import unwound
 from kincompile.runtime.status import Status
 
@@ -163,7 +163,7 @@ def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
 def _equations(inputs: Inputs) -> Problem:
     """Return the equations as a search judges them, with angles that have no unit among them."""
     time = float(inputs.t[0])
-    equations = measured(inputs.code, inputs.p, inputs.guess, time)
+    equations = problem(inputs.code, inputs.p, inputs.guess, time)
     equations.angular = equations.angular | _periodic(equations, time, inputs.guess)
     return equations
 
@@ -176,7 +176,7 @@ def _is_open(inputs: Inputs, q: Vector, without: Sequence[str]) -> bool:
     if np.max(np.abs(q[angles]), initial=0.0) < NOTICEABLE:
         return False
     time = float(inputs.t[0])
-    equations = measured(inputs.code, inputs.p, inputs.guess, time)
+    equations = problem(inputs.code, inputs.p, inputs.guess, time)
     mirrored = q.copy()
     mirrored[angles] = -q[angles]
     found = _assembled(equations, time, mirrored)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.runtime.problem import measured
+from kincompile.runtime.problem import problem
 
 if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array as Vector
@@ -33,7 +33,7 @@ def conditions(code: Compiled, q: Vector, t: Vector, p: Vector) -> Vector:
         return result
     with np.errstate(all="ignore"):
         first = found[0]
-        equations = measured(code, p, np.ascontiguousarray(q[first]), float(t[first]))
+        equations = problem(code, p, np.ascontiguousarray(q[first]), float(t[first]))
         columns = equations.reference
         rows = equations.weights()
         for start in range(0, found.size, BLOCK):

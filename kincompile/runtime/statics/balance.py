@@ -17,7 +17,7 @@ from kincompile.criteria import RANK, TINY, ZERO
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.corrector import nearest
-from kincompile.runtime.problem import measured
+from kincompile.runtime.problem import problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Balance:
 
     def __init__(self, inputs: Inputs) -> None:
         self.code, self._p = inputs.code, inputs.p
-        self.equations: Problem = measured(self.code, inputs.p, inputs.guess, float(inputs.t[0]))
+        self.equations: Problem = problem(self.code, inputs.p, inputs.guess, float(inputs.t[0]))
 
     @property
     def scale(self) -> Array:

@@ -60,7 +60,7 @@ def test_that_rates_solve_the_equations_of_velocity_and_acceleration(modules, ki
     engine, point, matrix = evaluated(module, kind)
     b = right_side(point)
     p = module.DEFAULTS
-    equations = problem(module, p, module.GUESS, TIME)
+    equations = problem(code_of(module), p, module.GUESS, TIME)
     rates = engine.solved(equations, point, b)
     assert np.all(rates.are_met)
     q = point.q.T
@@ -115,7 +115,7 @@ def test_that_redundant_equations_are_solved_in_the_least_squares_sense():
         module = kc.compile(m)
     engine = Dense(code_of(module), module.DEFAULTS)
     point = engine.evaluate(np.array([1.0, 0.0, 0.0]), 0.0)
-    equations = problem(module, module.DEFAULTS, point.q, 0.0)
+    equations = problem(code_of(module), module.DEFAULTS, point.q, 0.0)
     rates = engine.solved(equations, point, np.zeros(5))
     np.testing.assert_allclose(rates.q_dot, (1, 0, 0), atol=1e-12)
     assert rates.are_met

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.march import March, State
 from kincompile.runtime.problem import problem
@@ -16,7 +17,7 @@ P = np.array([1.0])
 @pytest.fixture
 def march(example_3_7_5):
     q = position(0.0, 1)
-    equations = problem(example_3_7_5, P, q, 0.0)
+    equations = problem(code_of(example_3_7_5), P, q, 0.0)
     return March(equations, equations.engine, 1e-10)
 
 
@@ -56,7 +57,7 @@ def test_past_a_bifurcation_the_other_branch_has_a_kink(march):
 
 def test_a_batch_is_corrected_each_as_if_alone(example_named):
     module = example_named("four_bar").module
-    equations = problem(module, module.DEFAULTS, module.GUESS, 0.0)
+    equations = problem(code_of(module), module.DEFAULTS, module.GUESS, 0.0)
     march = March(equations, Planned(equations.code, module.DEFAULTS), 1e-10)
     guesses = np.add.outer(module.GUESS, [0.0, 1e-3, 0.05])
     together = march.correct_together(guesses.copy(), 0.0, 25)

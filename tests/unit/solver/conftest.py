@@ -51,7 +51,7 @@ def start_of(module, t):
     """Return an assembled position at a time, and the size of the mechanism."""
     q = kc.solve(module, [t]).q[0]
     inputs = read_inputs(module, np.array([t]), None, None, criteria.TOLERANCE, 25)
-    return q, problem(module, inputs.p, q, t).size
+    return q, problem(code_of(module), inputs.p, q, t).size
 
 
 def rough_guesses(module, count):
@@ -61,7 +61,7 @@ def rough_guesses(module, count):
     parameters are.
     """
     start = kc.solve(module, [0.0]).q[0]
-    equations = problem(module, module.DEFAULTS, start.copy(), 0.0)
+    equations = problem(code_of(module), module.DEFAULTS, start.copy(), 0.0)
     rng = np.random.default_rng(7)
     guesses = start + equations.reference * rng.uniform(-0.8, 0.8, (count, start.size))
     turns = 2 * np.pi * rng.integers(-2, 3, guesses[::2].shape)
@@ -74,7 +74,7 @@ def rough_guesses(module, count):
 def size_around(module, guess):
     """Return the size of a mechanism as the runtime finds it at a guess for t = 0."""
     oriented = read_inputs(module, np.zeros(1), None, guess, criteria.TOLERANCE, 25).guess
-    return problem(module, module.DEFAULTS, oriented, 0.0).size
+    return problem(code_of(module), module.DEFAULTS, oriented, 0.0).size
 
 
 def marched(module, lanes, t, sets, *, together=False):

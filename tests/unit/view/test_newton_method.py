@@ -11,6 +11,7 @@ import sympy
 import kincompile as kc
 from kincompile.emitters.templates import read
 from kincompile.runtime.corrector import iterate
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.problem import problem
 from kincompile.view.page_scripts import MOST_COORDINATES, solver_script
 
@@ -94,7 +95,7 @@ def test_that_iterates_are_those_of_the_runtime(tmp_path, example):
     for guess, attempt in zip(starts, found, strict=True):
         q = np.array(guess)
         # The page has the size of the mechanism from the model's guess.
-        equations = problem(module, module.DEFAULTS, module.GUESS, 0.0)
+        equations = problem(code_of(module), module.DEFAULTS, module.GUESS, 0.0)
         expected = iterate(equations, t, q, 1e-10, 25)
         assert attempt["status"] == STATUSES[expected.status.name]
         assert len(attempt["iterates"]) == len(expected.points)
