@@ -164,12 +164,16 @@ def read_json(path: Path, content: bytes, words: Mapping[str, str] | None = None
     Raises
     ------
     ModelError
-        If it is not JSON, a key is given twice, or a number is not finite; with the line.
+        If it is not JSON, has too many values, gives a key twice, or a number is not finite; with
+        the line.
     """
     text = decoded(path, content)
-    if words is not None:
-        text = _FOREIGN.sub(lambda found: _native(found, words), text)
     _check_bounds(path, text, _JSON_OUTLINE)
+    if words is not None:
+        # Four quotes for a key with its text, without those inside a text.
+        if text.count('"') - text.count('\\"') > 4 * MAX_VALUES:
+            raise ModelError(f"{escaped(path)}: the file has more than {2 * MAX_VALUES:,} texts")
+        text = _FOREIGN.sub(lambda found: _native(found, words), text)
     repeated: list[str] = []
     try:
         data = json.loads(
