@@ -1479,12 +1479,18 @@ static int holds_to_rounding(strip *b, start *s)
     return 1;
 }
 
+// Return the terms of an equation to divide by, 1.0 where they contribute nothing.
+static double divisor(double terms)
+{
+    return terms > 0.0 ? terms : 1.0;
+}
+
 // Return by how much all equations are missed, relative to terms.
 static double residual(const double *terms, strip *b)
 {
     double total = 0.0;
     for (int i = 0; i < M; i++) {
-        const double part = b->Phi[i][0] / (terms[i] > 0.0 ? terms[i] : 1.0);
+        const double part = b->Phi[i][0] / divisor(terms[i]);
         total += part * part;
     }
     return sqrt(total);
@@ -1497,10 +1503,10 @@ static void fill_matrix(const double *scale, const double *terms, strip *b, star
     for (int e = 0; e < NONZEROS; e++) {
         const int i = slider_crank_pattern[e][0];
         const int j = slider_crank_pattern[e][1];
-        s->matrix[i][j] = b->Phi_q[e][0] * scale[j] / (terms[i] > 0.0 ? terms[i] : 1.0);
+        s->matrix[i][j] = b->Phi_q[e][0] * scale[j] / divisor(terms[i]);
     }
     for (int i = 0; i < M; i++)
-        s->matrix[i][N] = -b->Phi[i][0] / (terms[i] > 0.0 ? terms[i] : 1.0);
+        s->matrix[i][N] = -b->Phi[i][0] / divisor(terms[i]);
 }
 
 // Find the step by which so many rows miss least (Householder); return whether there is one.
@@ -1830,6 +1836,57 @@ static void take(strip *b, start *s, attempt *a, attempt *other, attempt *best)
     }
 }
 
+// Rotate two columns of the matrix, and of the directions, until they are orthogonal. Return
+// whether they were not.
+static int rotate(int i, int j, start *s)
+{
+    double first = 0.0;
+    double second = 0.0;
+    double mixed = 0.0;
+    for (int k = 0; k < M; k++) {
+        first += s->matrix[k][i] * s->matrix[k][i];
+        second += s->matrix[k][j] * s->matrix[k][j];
+        mixed += s->matrix[k][i] * s->matrix[k][j];
+    }
+    if (!(fabs(mixed) > ROUNDING / 16.0 * sqrt(first * second)))
+        return 0;
+    const double zeta = (second - first) / (2.0 * mixed);
+    double tangent = 1.0 / (fabs(zeta) + sqrt(1.0 + zeta * zeta));
+    tangent = zeta >= 0.0 ? tangent : -tangent;
+    const double cosine = 1.0 / sqrt(1.0 + tangent * tangent);
+    for (int k = 0; k < M; k++) {
+        const double x = s->matrix[k][i];
+        const double y = s->matrix[k][j];
+        s->matrix[k][i] = cosine * (x - tangent * y);
+        s->matrix[k][j] = cosine * (tangent * x + y);
+    }
+    for (int k = 0; k < N; k++) {
+        const double x = s->directions[k][i];
+        const double y = s->directions[k][j];
+        s->directions[k][i] = cosine * (x - tangent * y);
+        s->directions[k][j] = cosine * (tangent * x + y);
+    }
+    return 1;
+}
+
+// Rotate pairs of columns of the matrix until all are orthogonal (Jacobi).
+static void make_orthogonal(start *s)
+{
+    memset(s->directions, 0, sizeof s->directions);
+    for (int i = 0; i < N; i++)
+        s->directions[i][i] = 1.0;
+    int is_done = 0;
+    int sweeps = 0;
+    while (!is_done && sweeps < 60) {
+        is_done = 1;
+        sweeps++;
+        for (int i = 0; i < N; i++)
+            for (int j = i + 1; j < N; j++)
+                if (rotate(i, j, s))
+                    is_done = 0;
+    }
+}
+
 // Find about where the mechanism can be assembled beyond the nearest singular position. Along its
 // movement v the smallest singular value u^T Phi_q v falls to zero half way. The position is left
 // in the step. Return whether there is one; a large mechanism is not asked.
@@ -1840,46 +1897,7 @@ static int other_side(const double *q, strip *b, start *s)
     double trial[N];
     double image[M];
     fill_matrix(s->near, s->magnitude, b, s);
-    memset(s->directions, 0, sizeof s->directions);
-    for (int i = 0; i < N; i++)
-        s->directions[i][i] = 1.0;
-    int is_done = 0;
-    int sweeps = 0;
-    // Rotations of pairs of columns until all are orthogonal (Jacobi).
-    while (!is_done && sweeps < 60) {
-        is_done = 1;
-        sweeps++;
-        for (int i = 0; i < N; i++)
-            for (int j = i + 1; j < N; j++) {
-                double first = 0.0;
-                double second = 0.0;
-                double mixed = 0.0;
-                for (int k = 0; k < M; k++) {
-                    first += s->matrix[k][i] * s->matrix[k][i];
-                    second += s->matrix[k][j] * s->matrix[k][j];
-                    mixed += s->matrix[k][i] * s->matrix[k][j];
-                }
-                if (fabs(mixed) > ROUNDING / 16.0 * sqrt(first * second)) {
-                    is_done = 0;
-                    const double zeta = (second - first) / (2.0 * mixed);
-                    double tangent = 1.0 / (fabs(zeta) + sqrt(1.0 + zeta * zeta));
-                    tangent = zeta >= 0.0 ? tangent : -tangent;
-                    const double cosine = 1.0 / sqrt(1.0 + tangent * tangent);
-                    for (int k = 0; k < M; k++) {
-                        const double x = s->matrix[k][i];
-                        const double y = s->matrix[k][j];
-                        s->matrix[k][i] = cosine * (x - tangent * y);
-                        s->matrix[k][j] = cosine * (tangent * x + y);
-                    }
-                    for (int k = 0; k < N; k++) {
-                        const double x = s->directions[k][i];
-                        const double y = s->directions[k][j];
-                        s->directions[k][i] = cosine * (x - tangent * y);
-                        s->directions[k][j] = cosine * (tangent * x + y);
-                    }
-                }
-            }
-    }
+    make_orthogonal(s);
     int smallest = 0;
     double least = INFINITY;
     for (int i = 0; i < N; i++) {
@@ -1902,8 +1920,7 @@ static int other_side(const double *q, strip *b, start *s)
     double bend = 0.0;
     for (int e = 0; e < NONZEROS; e++) {
         const int i = slider_crank_pattern[e][0];
-        const double size = s->magnitude[i] > 0.0 ? s->magnitude[i] : 1.0;
-        bend += image[i] * b->Phi_q[e][0] / size * s->way[slider_crank_pattern[e][1]];
+        bend += image[i] * b->Phi_q[e][0] / divisor(s->magnitude[i]) * s->way[slider_crank_pattern[e][1]];
     }
     double total = 0.0;
     bend = (bend - least) / MIRROR_STEP;

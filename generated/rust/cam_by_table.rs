@@ -775,11 +775,16 @@ fn holds_to_rounding(b: &Point, s: &mut Start) -> bool {
     return true;
 }
 
+/// Return the terms of an equation to divide by, 1.0 where they contribute nothing.
+fn divisor(terms: f64) -> f64 {
+    return if terms > 0.0 { terms } else { 1.0 };
+}
+
 /// Return by how much all equations are missed, relative to terms.
 fn residual(terms: [f64; N_EQUATIONS], b: &Point) -> f64 {
     let mut total: f64 = 0.0;
     for i in 0..N_EQUATIONS {
-        let part = b.Phi[i] / (if terms[i] > 0.0 { terms[i] } else { 1.0 });
+        let part = b.Phi[i] / divisor(terms[i]);
         total += part * part;
     }
     return total.sqrt();
@@ -791,10 +796,10 @@ fn fill_matrix(scale: [f64; N_COORDINATES], terms: [f64; N_EQUATIONS], b: &Point
     for e in 0..NONZEROS {
         let i = PATTERN[e][0];
         let j = PATTERN[e][1];
-        s.matrix[i][j] = b.Phi_q[e] * scale[j] / (if terms[i] > 0.0 { terms[i] } else { 1.0 });
+        s.matrix[i][j] = b.Phi_q[e] * scale[j] / divisor(terms[i]);
     }
     for i in 0..N_EQUATIONS {
-        s.matrix[i][N_COORDINATES] = -b.Phi[i] / (if terms[i] > 0.0 { terms[i] } else { 1.0 });
+        s.matrix[i][N_COORDINATES] = -b.Phi[i] / divisor(terms[i]);
     }
 }
 
@@ -1152,6 +1157,60 @@ fn take(b: &mut Point, s: &mut Start, a: &mut Attempt, other: &mut Attempt, best
     }
 }
 
+/// Rotate two columns of the matrix, and of the directions, until they are orthogonal. Return
+/// whether they were not.
+fn rotate(i: usize, j: usize, s: &mut Start) -> bool {
+    let mut first: f64 = 0.0;
+    let mut second: f64 = 0.0;
+    let mut mixed: f64 = 0.0;
+    for k in 0..N_EQUATIONS {
+        first += s.matrix[k][i] * s.matrix[k][i];
+        second += s.matrix[k][j] * s.matrix[k][j];
+        mixed += s.matrix[k][i] * s.matrix[k][j];
+    }
+    if !(mixed.abs() > ROUNDING / 16.0 * (first * second).sqrt()) {
+        return false;
+    }
+    let zeta = (second - first) / (2.0 * mixed);
+    let mut tangent = 1.0 / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
+    tangent = if zeta >= 0.0 { tangent } else { -tangent };
+    let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
+    for k in 0..N_EQUATIONS {
+        let x = s.matrix[k][i];
+        let y = s.matrix[k][j];
+        s.matrix[k][i] = cosine * (x - tangent * y);
+        s.matrix[k][j] = cosine * (tangent * x + y);
+    }
+    for k in 0..N_COORDINATES {
+        let x = s.directions[k][i];
+        let y = s.directions[k][j];
+        s.directions[k][i] = cosine * (x - tangent * y);
+        s.directions[k][j] = cosine * (tangent * x + y);
+    }
+    return true;
+}
+
+/// Rotate pairs of columns of the matrix until all are orthogonal (Jacobi).
+fn make_orthogonal(s: &mut Start) {
+    s.directions.fill([0.0; WIDE]);
+    for i in 0..N_COORDINATES {
+        s.directions[i][i] = 1.0;
+    }
+    let mut is_done = false;
+    let mut sweeps = 0;
+    while !is_done && sweeps < 60 {
+        is_done = true;
+        sweeps += 1;
+        for i in 0..N_COORDINATES {
+            for j in i + 1..N_COORDINATES {
+                if rotate(i, j, s) {
+                    is_done = false;
+                }
+            }
+        }
+    }
+}
+
 /// Find about where the mechanism can be assembled beyond the nearest singular position. Along its
 /// movement v the smallest singular value u^T Phi_q v falls to zero half way. The position is left
 /// in the step. Return whether there is one; a large mechanism is not asked.
@@ -1162,48 +1221,7 @@ fn other_side(q: [f64; N_COORDINATES], b: &mut Point, s: &mut Start) -> bool {
     let mut trial = [0.0; N_COORDINATES];
     let mut image = [0.0; N_EQUATIONS];
     fill_matrix(s.near, s.magnitude, b, s);
-    s.directions.fill([0.0; WIDE]);
-    for i in 0..N_COORDINATES {
-        s.directions[i][i] = 1.0;
-    }
-    let mut is_done = false;
-    let mut sweeps = 0;
-    // Rotations of pairs of columns until all are orthogonal (Jacobi).
-    while !is_done && sweeps < 60 {
-        is_done = true;
-        sweeps += 1;
-        for i in 0..N_COORDINATES {
-            for j in i + 1..N_COORDINATES {
-                let mut first: f64 = 0.0;
-                let mut second: f64 = 0.0;
-                let mut mixed: f64 = 0.0;
-                for k in 0..N_EQUATIONS {
-                    first += s.matrix[k][i] * s.matrix[k][i];
-                    second += s.matrix[k][j] * s.matrix[k][j];
-                    mixed += s.matrix[k][i] * s.matrix[k][j];
-                }
-                if mixed.abs() > ROUNDING / 16.0 * (first * second).sqrt() {
-                    is_done = false;
-                    let zeta = (second - first) / (2.0 * mixed);
-                    let mut tangent = 1.0 / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
-                    tangent = if zeta >= 0.0 { tangent } else { -tangent };
-                    let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
-                    for k in 0..N_EQUATIONS {
-                        let x = s.matrix[k][i];
-                        let y = s.matrix[k][j];
-                        s.matrix[k][i] = cosine * (x - tangent * y);
-                        s.matrix[k][j] = cosine * (tangent * x + y);
-                    }
-                    for k in 0..N_COORDINATES {
-                        let x = s.directions[k][i];
-                        let y = s.directions[k][j];
-                        s.directions[k][i] = cosine * (x - tangent * y);
-                        s.directions[k][j] = cosine * (tangent * x + y);
-                    }
-                }
-            }
-        }
-    }
+    make_orthogonal(s);
     let mut smallest = 0;
     let mut least: f64 = INFINITE;
     for i in 0..N_COORDINATES {
@@ -1229,8 +1247,7 @@ fn other_side(q: [f64; N_COORDINATES], b: &mut Point, s: &mut Start) -> bool {
     let mut bend: f64 = 0.0;
     for e in 0..NONZEROS {
         let i = PATTERN[e][0];
-        let size = if s.magnitude[i] > 0.0 { s.magnitude[i] } else { 1.0 };
-        bend += image[i] * b.Phi_q[e] / size * s.way[PATTERN[e][1]];
+        bend += image[i] * b.Phi_q[e] / divisor(s.magnitude[i]) * s.way[PATTERN[e][1]];
     }
     let mut total: f64 = 0.0;
     bend = (bend - least) / MIRROR_STEP;

@@ -39,33 +39,50 @@ from kincompile.solver.nodes import (
 from kincompile.solver.vocabulary import CAREFUL, CONSTANTS
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Sequence
+    from importlib.resources.abc import Traversable
 
     from kincompile.solver.nodes import Expression, Statement
+
+
+MARCH, START = ("step", "march"), ("attempt", "start")
+"""The modules of a text, each of which goes on with the ones before."""
 
 
 @cache
 def solver(*, is_careful: bool = False) -> Text:
     """Return the march, read once: the plain one or the careful one."""
-    source = (files("kincompile.solver") / "text.py").read_text(encoding="utf-8")
-    return read(source, is_careful=is_careful)
+    text = Text({}, {})
+    for name in MARCH:
+        text = read(source_of(name), text, is_careful=is_careful)
+    return text
 
 
 @cache
 def start() -> Text:
     """Return the start, read once."""
-    source = (files("kincompile.solver") / "start.py").read_text(encoding="utf-8")
-    return read(source, {"Point": solver().structs["Point"]})
+    text = Text({"Point": solver().structs["Point"]}, {})
+    for name in START:
+        text = read(source_of(name), text)
+    return text
 
 
-def read(
-    source: str, known: Mapping[str, Struct] | None = None, *, is_careful: bool = False
-) -> Text:
-    """Return the structs and functions of a text; a `Refused` names the line that is none.
+def place_of(name: str) -> Traversable:
+    """Return where a module of a text is."""
+    return files("kincompile.solver") / f"{name}.py"
 
-    It may use known structs of another text.
+
+def source_of(name: str) -> str:
+    """Return the source of a module of a text."""
+    return place_of(name).read_text(encoding="utf-8")
+
+
+def read(source: str, known: Text | None = None, *, is_careful: bool = False) -> Text:
+    """Return the structs and functions of a source; a `Refused` names the line that is none.
+
+    It goes on with those that are known.
     """
-    text = Text({**(known or {})}, {})
+    text = Text({**known.structs}, {**known.functions}) if known else Text({}, {})
     tree, left_out = chosen(source, is_careful=is_careful)
     comments = Comments(source, left_out)
     for item in tree.body:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import inspect
 from dataclasses import dataclass
-from importlib.resources import files
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kincompile.criteria import rounded
-from kincompile.solver import vocabulary
-from kincompile.solver.reader import chosen
+from kincompile.solver import reader, vocabulary
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -52,25 +50,26 @@ def on_numpy(mechanism: Mechanism, *, is_careful: bool = False) -> ModuleType:
     sizes = {**mechanism.sizes, "TALL": m + n, "WIDE": n + 1}
     kernels = _Kernels(mechanism)
     own = {name: getattr(kernels, name) for name in (*vocabulary.KERNELS, "solve", "missed")}
-    module = _copy_of("start", is_careful=is_careful)
-    march = _copy_of("text", is_careful=is_careful)
-    vars(module).update(
-        {name: value for name, value in vars(march).items() if not name.startswith("_")}
-    )
-    for text in (march, module):
+    march = _copy_of(reader.MARCH, {}, is_careful=is_careful)
+    start = _copy_of(reader.START, vars(march), is_careful=is_careful)
+    for text in (march, start):
         vars(text).update(**sizes, **mechanism.tables, **own)
-    for struct in vars(module).values():
+    for struct in vars(start).values():
         if inspect.isclass(struct) and issubclass(struct, Struct):
             struct.sizes = sizes
-    return module
+    return start
 
 
-def _copy_of(name: str, *, is_careful: bool) -> ModuleType:
-    """Return a module of its own for a text."""
-    place = files("kincompile.solver") / f"{name}.py"
-    tree, _ = chosen(place.read_text(encoding="utf-8"), is_careful=is_careful)
-    module = ModuleType(f"kincompile.solver.{name}")
-    exec(compile(tree, str(place), "exec"), vars(module))
+def _copy_of(parts: Sequence[str], known: Mapping[str, Any], *, is_careful: bool) -> ModuleType:
+    """Return a module of its own for a text, which has known names besides."""
+    module = ModuleType(f"kincompile.solver.{parts[-1]}")
+    vars(module).update({name: x for name, x in known.items() if not name.startswith("_")})
+    modules = {f"kincompile.solver.{x}" for x in (*reader.MARCH, *reader.START)}
+    for name in parts:
+        tree, _ = reader.chosen(reader.source_of(name), is_careful=is_careful)
+        # What stands in another module of the texts is there already, for this mechanism.
+        tree.body = [x for x in tree.body if getattr(x, "module", None) not in modules]
+        exec(compile(tree, str(reader.place_of(name)), "exec"), vars(module))
     return module
 
 

@@ -1,15 +1,14 @@
 """What the reader of the solver's text refuses, each at its line; and what it makes of the rest."""
 
-from importlib.resources import files
 from typing import Any
 
 import pytest
 
 from kincompile.solver.expressions import Refused
 from kincompile.solver.nodes import LANE, Comment, Name, variables_in
-from kincompile.solver.reader import read, solver
+from kincompile.solver.reader import MARCH, read, solver, source_of
 
-TEXT = (files("kincompile.solver") / "text.py").read_text(encoding="utf-8")
+TEXT = "".join(map(source_of, MARCH))
 
 REFUSED = {
     "a name that is unknown": ("going & is_large", "going & is_larg", "is_larg is not known"),

@@ -1,0 +1,292 @@
+"""The march of a mechanism over a time grid: the second half of the text that `step` begins."""
+
+from __future__ import annotations
+
+from kincompile.criteria import *
+from kincompile.solver.step import *
+from kincompile.solver.words import *
+
+
+class Variants(Struct):
+    """Motions over the same times, each with parameters of its own, and where its numbers go."""
+
+    count: Count
+    variants: Count
+    t: Vector
+    p: Table
+    guess: Table
+    size: Real
+    tolerance: Real
+    max_iterations: Int
+    q: Block
+    q_dot: Block
+    q_ddot: Block
+    residual: Vector
+    status: Vector[Int]
+    iterations: Vector[Int]
+
+
+def speed_of(b: Point, s: Scales) -> Real:
+    """Return the largest velocity of a point, in scales of the coordinates."""
+    most: Real = 0.0
+    for i in range(N):
+        speed = abs(b.q_dot[i][0]) * s.inverse[i][0]
+        most = speed if speed > most else most
+    return most
+
+
+def locks_up(b: Point, s: Scales, t: Real, smallest: Real, before: Real) -> Bool:
+    """Say whether a point that cannot be left by the smallest step is at a lock-up before a time.
+
+    There the equations must have values. Its speed was that before.
+    """
+    forward = t - b.t[0]
+    speed = speed_of(b, s)
+    growth: Real = 0.0
+    for i in range(N):
+        if abs(b.q_dot[i][0]) * s.inverse[i][0] == speed:
+            sign = 1.0 if b.q_dot[i][0] > 0.0 else -1.0
+            growth = b.q_ddot[i][0] * s.inverse[i][0] * sign
+    left = speed / (2.0 * abs(growth)) if forward * growth > 0.0 else INFINITE
+    if not (left <= LEFT * smallest and speed >= GROWN * before):
+        return False
+    b.t[0] = t
+    position(b, lanes=1)
+    total: Real = 0.0
+    for i in range(M):
+        total += b.Phi[i][0]
+    return finite(total) and abs(forward) - left > BEFORE_LOCK_UP / SMALLEST_PART * smallest
+
+
+def scales_of(own: Scales, s: Scales, k: Count):
+    """Take the scales of one lane."""
+    own.tolerance = s.tolerance
+    for i in range(M):
+        own.magnitude[i][0] = s.magnitude[i][k]
+        own.noise[i][0] = s.noise[i][k]
+        if IS_CAREFUL:
+            own.part[i][0] = s.part[i][k]
+        else:
+            own.weight[i][0] = s.weight[i][k]
+    for i in range(N):
+        own.reference[i][0] = s.reference[i][k]
+        own.inverse[i][0] = s.inverse[i][k]
+
+
+def advance(b: Point, s: Scales, at: State, t: Real, k: Count, o: Outcome):
+    """Take one lane from a good point to a time, in sub-steps.
+
+    These are halved where they fail and doubled where they do not.
+    """
+    alone = Point()
+    own = Scales()
+    found = Outcome()
+    constants(alone, lanes=1)
+    scales_of(own, s, k)
+    found.is_over[0] = False
+    put_at(alone, at, 0, 1)
+    before = speed_of(alone, own)
+    smallest = abs(t - at.t) * SMALLEST_PART
+    h: Real = 0.5 * (t - at.t)
+    iterations: Int = 0
+    is_stuck: Bool = False
+    for n in range(MAX_SUBSTEPS):
+        is_whole = abs(h) >= abs(t - at.t)
+        following = t if is_whole else at.t + h
+        put_at(alone, at, 0, 1)
+        step(alone, own, following, found, lanes=1)
+        is_good = found.status[0] == CONVERGED
+        iterations += found.iterations[0]
+        if is_good:
+            take_up(at, alone, 0)
+        is_stuck = not is_good and abs(h) <= smallest
+        if is_stuck or (is_good and is_whole):
+            break
+        h *= 2.0 if is_good else 0.5
+    status: Int = found.status[0]
+    if status == CONVERGED and at.t != t:
+        status = NOT_CONVERGED
+    if is_stuck:
+        put_at(alone, at, 0, 1)
+        if locks_up(alone, own, t, smallest, before):
+            status = LOCK_UP
+    o.residual[k] = found.residual[0]
+    o.status[k] = status
+    o.iterations[k] = iterations
+    take_up(at, alone, 0)
+    put_at(b, at, k, k + 1)
+
+
+if IS_CAREFUL:
+
+    def advance_carefully(
+        b: Point, s: Scales, at: State, nearness: Real, t: Real, o: Outcome
+    ) -> Bool:
+        """Take a good point, of a sensitivity, to a time in sub-steps.
+
+        These are halved where they fail and doubled where they do not; after one that was too long
+        the next ones are no longer. What is near a singular position is not gone on from. Return
+        whether the march ended, and was not given up.
+        """
+        fastest: Real = TINY
+        for i in range(N):
+            speed = abs(at.q_dot[i]) * s.inverse[i][0]
+            gain = sqrt(abs(at.q_ddot[i]) * s.inverse[i][0])
+            fastest = speed if speed > fastest else fastest
+            fastest = gain if gain > fastest else fastest
+        smallest = min(abs(t - at.t), 1.0 / fastest) * SMALLEST_PART
+        near: Real = nearness
+        h: Real = t - at.t
+        iterations: Int = 0
+        wait: Int = 0
+        for n in range(MAX_SUBSTEPS):
+            is_whole = abs(h) >= abs(t - at.t)
+            put_at(b, at, 0, 1)
+            step(b, s, t if is_whole else at.t + h, o, lanes=1)
+            iterations += o.iterations[0]
+            o.iterations[0] = iterations
+            if is_whole and o.is_there[0]:
+                return True
+            is_good = o.status[0] == CONVERGED
+            is_near = is_good and o.sensitivity[0] > max(TOO_NEAR, near)
+            if is_good and not is_near:
+                take_up(at, b, 0)
+                near = o.sensitivity[0]
+                wait = max(wait - 1, 0)
+                if wait == 0 or abs(2.0 * h) >= abs(t - at.t):
+                    h *= 2.0
+            elif abs(h) <= smallest:
+                if is_near:
+                    o.status[0] = SINGULAR
+                o.is_there[0] = False
+                return True
+            else:
+                h *= 0.5
+                wait = PATIENCE
+        o.status[0] = NOT_CONVERGED
+        o.is_there[0] = False
+        return False
+
+
+def record(m: Variants, b: Point, o: Outcome, time: Count, first: Count, count: Count):
+    """Write points at one time, from a variant on; those that are over have no numbers."""
+    store(m.q, b.q, time, first, count)
+    store(m.q_dot, b.q_dot, time, first, count)
+    store(m.q_ddot, b.q_ddot, time, first, count)
+    for k in lanes(count):
+        place = time * m.variants + first + k
+        m.residual[place] = NOTHING if o.is_over[k] else o.residual[k]
+        m.status[place] = o.status[k]
+        m.iterations[place] = o.iterations[k]
+        if o.is_over[k]:
+            for i in range(N):
+                m.q[i, time, first + k] = NOTHING
+                m.q_dot[i, time, first + k] = NOTHING
+                m.q_ddot[i, time, first + k] = NOTHING
+
+
+def assemble(m: Variants, b: Point, s: Scales, first: Count, count: Count, o: Outcome):
+    """Assemble variants from their guesses, at the first time."""
+    constants(b, lanes=count)
+    s.tolerance = m.tolerance
+    for i in range(K):
+        for k in lanes(count):
+            b.p[i][k] = m.p[i, first + k]
+    for i in range(N):
+        for k in lanes(count):
+            b.q[i][k] = m.guess[i, first + k]
+    for k in lanes(count):
+        b.t[k] = m.t[0]
+        o.is_over[k] = False
+    measure(b, m.size, s, lanes=count)
+    correct(b, s, m.max_iterations, o, lanes=count)
+    complete(b, s, o, lanes=count)
+    # The guess may be rough.
+    measure(b, m.size, s, lanes=count)
+
+
+def march(m: Variants) -> Count:
+    """Follow one motion; return how many points converged, from the first one on.
+
+    The lanes are times of the motion, as if each were a variant at its own: all have the same
+    parameters, and what is written for a variant is the time's.
+    """
+    b = Point()
+    s = Scales()
+    o = Outcome()
+    at = State()
+    assemble(m, b, s, 0, LANES, o)
+    record(m, b, o, 0, 0, 1)
+    take_up(at, b, 0)
+    status: Int = o.status[0]
+    done: Count = 1 if status == CONVERGED else 0
+    width: Count = 1
+    while status == CONVERGED and done < m.count:
+        count = min(m.count - done, width)
+        good: Count = 0
+        put_at(b, at, 0, count)
+        step(b, s, part(m.t, done), o, lanes=count)
+        while good < count and o.status[good] == CONVERGED:
+            good += 1
+        if good > 0:
+            record(m, b, o, 0, done, good)
+            take_up(at, b, good - 1)
+            done += good
+            # The fewer iterations, the more points the next prediction can serve.
+            if good < count or o.iterations[good - 1] > 3:
+                width = good // 2 if good > 1 else 1
+            else:
+                width = min(2 * width, LANES)
+        elif count > 1:
+            width = 1
+        else:
+            advance(b, s, at, m.t[done], 0, o)
+            record(m, b, o, 0, done, 1)
+            status = o.status[0]
+            if status == CONVERGED:
+                done += 1
+    for k in range(done + 1, m.count):
+        m.status[k] = NOT_REACHED
+    return done
+
+
+def put_to_rest(m: Variants, b: Point, o: Outcome, first: Count, count: Count):
+    """Let the variants that failed at a time rest at the guess, where they disturb no others."""
+    for k in lanes(count):
+        if o.is_over[k]:
+            o.status[k] = NOT_REACHED
+        if o.status[k] != CONVERGED:
+            o.is_over[k] = True
+            for i in range(N):
+                b.q[i][k] = m.guess[i, first + k]
+                b.q_dot[i][k] = 0.0
+                b.q_ddot[i][k] = 0.0
+
+
+def march_variants(m: Variants) -> Count:
+    """Follow the motions of variants; return how many converged at all times."""
+    b = Point()
+    before = Point()
+    s = Scales()
+    o = Outcome()
+    at = State()
+    good: Count = 0
+    for first in range(0, m.variants, LANES):
+        count = min(m.variants - first, LANES)
+        assemble(m, b, s, first, count, o)
+        put_to_rest(m, b, o, first, count)
+        record(m, b, o, 0, first, count)
+        for time in range(1, m.count):
+            keep(before, b)
+            t: Lane = m.t[time]
+            step(b, s, t, o, lanes=count)
+            for k in lanes(count):
+                if o.status[k] != CONVERGED and not o.is_over[k]:
+                    take_up(at, before, k)
+                    advance(b, s, at, m.t[time], k, o)
+            put_to_rest(m, b, o, first, count)
+            record(m, b, o, time, first, count)
+        for k in lanes(count):
+            if not o.is_over[k]:
+                good += 1
+    return good
