@@ -169,6 +169,18 @@ def kernels(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     return {**position, **single, "kinematics": TOGETHER["kinematics"], **whole}
 
 
+def kernels_apart(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
+    """Return the kernels without ``kinematics``, where all of it at once is of no use."""
+    found = kernels(given)
+    del found["kinematics"]
+    return found
+
+
+def kernel_of(quantity: Quantity, found: Mapping[str, tuple[str, ...]]) -> str:
+    """Return the first of some kernels that gives a quantity."""
+    return next(name for name, own in found.items() if quantity.name in own)
+
+
 def nonzeros_of(quantity: Quantity) -> str:
     """Return what compiled code calls the entries of a matrix in the order of its pattern."""
     return "nonzeros" if quantity.name == "Phi_q" else f"{quantity.name}_nonzeros"

@@ -28,6 +28,11 @@ def indented(lines: Iterable[str], level: int = 1) -> str:
     return "\n".join(f"{'    ' * level}{line}".rstrip() for line in lines)
 
 
+def braced(head: Iterable[str], body: Iterable[str]) -> list[str]:
+    """Return a function: its first lines with the opening brace, and its statements."""
+    return [*head, *indented(body).split("\n"), "}"]
+
+
 def quoted(names: Iterable[str]) -> list[str]:
     """Return names in quotes, followed by commas, as many a line as fit."""
     return wrapped([f'"{name}"' for name in names])

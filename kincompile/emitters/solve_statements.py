@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile.emitters.lines import wrapped
+from kincompile.emitters.planned_solve import explained
 from kincompile.emitters.schedule import Assignment, count_uses
 
 if TYPE_CHECKING:
@@ -17,6 +18,21 @@ if TYPE_CHECKING:
     from kincompile.ir.inline import InlineProgram
 
     Call: TypeAlias = Callable[[BlockCall, Printer], list[str]]
+
+
+def solve_functions(
+    code: InlineProgram, listing: SolveListing, factor: list[str], solve: list[str]
+) -> list[str]:
+    """Return the functions that factor Phi_q and that solve Phi_q x = right, with what they are."""
+    return [
+        "",
+        "// What a solve needs of Phi_q, and the determinants of its blocks.",
+        *(f"// {line}" for line in explained(code, listing.plan)),
+        *factor,
+        "",
+        "// x of Phi_q x = right.",
+        *solve,
+    ]
 
 
 def factorization(

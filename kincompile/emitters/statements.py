@@ -32,6 +32,7 @@ class Statements:
     # continued, ending: what ends a line of a statement that goes on, and its last line
     continued: str = ""
     ending: str = ";"
+    time: str = ""  # what takes the time, where that is not given by itself
     # kept, taken: how a truth is kept among numbers, and how it is taken from there
     kept: str = "{}"
     taken: str = "{}"
@@ -86,6 +87,13 @@ class Statements:
         for vector, k, name in inputs_read(program, listing):
             lines += self._value(name, self.element.format(vector, k + self.first))
         return lines
+
+    def evaluation(self, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
+        """Return the statements that take quantities of a point to flat arrays."""
+        lines = self.inputs(code.program, listing)
+        lines += [self.time] if self.time and "t" in listing.inputs else []
+        lines += self.frames(listing, printer) + self.steps(listing, printer)
+        return lines + self.computed(code, listing, printer)
 
     def frames(self, listing: Listing, printer: Printer) -> list[str]:
         """Return the statements that compute cosine and sine of each body's angle."""

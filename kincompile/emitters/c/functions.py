@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from kincompile.emitters import solve_statements
 from kincompile.emitters.c.dialect import C
 from kincompile.emitters.evaluators import frames_title
 from kincompile.emitters.headings import title
-from kincompile.emitters.planned_solve import explained
+from kincompile.emitters.lines import braced
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.solve_statements import factorization, operands, solution
 from kincompile.emitters.statements import Statements
@@ -20,7 +21,29 @@ if TYPE_CHECKING:
     from kincompile.emitters.planned_solve import BlockCall, SolveListing
     from kincompile.ir.inline import InlineProgram
 
-WRITE = Statements("//", "const double {}", "at->{}[{}][lane]", "")
+
+class CStatements(Statements):
+    """Statements of C, where cosine and sine of an angle are one call."""
+
+    def frames(self, listing: Listing, printer: Printer) -> list[str]:
+        """Return the cosine and sine of each body's angle, a line a body."""
+        lines = [f"// {title}" for title in frames_title(listing.frames)]
+        for frame in listing.frames:
+            if frame.angle is not None:
+                c, s = (item.name for item in frame.values)
+                angle = printer.text(frame.angle)
+                lines += [f"double {c}, {s};", f"far |= cos_sin({angle}, exact, &{c}, &{s});"]
+            else:
+                lines += [
+                    f"const double {item.name} = {printer.definition(item.node)};"
+                    for item in frame.values
+                ]
+        return lines
+
+
+WRITE = CStatements(
+    "//", "const double {}", "at->{}[{}][lane]", "", time="const double t = at->t[lane];"
+)
 
 ABOUT = {
     "position": "Phi and Phi_q in one go: a step of Newton's method.",
@@ -38,33 +61,22 @@ def evaluator(name: str, code: InlineProgram, listing: Listing, printer: Printer
     """Return a function that evaluates quantities at a point, and the one for a strip."""
     has_angles = not ANGLE_FUNCTIONS.isdisjoint(listing.functions)
     body = ["int64_t far = 0;"] if has_angles else []
-    body += WRITE.inputs(code.program, listing)
-    body += ["const double t = at->t[lane];"] if "t" in listing.inputs else []
-    body += _frames(listing, printer) + WRITE.steps(listing, printer)
-    body += WRITE.computed(code, listing, printer)
+    body += WRITE.evaluation(code, listing, printer)
     write = _with_angles if has_angles else _plain
-    return [f"// {ABOUT.get(name) or quantity_named(name).about}", *write(name, body)]
+    return ["", f"// {ABOUT.get(name) or quantity_named(name).about}", *write(name, body)]
 
 
 def _plain(name: str, body: list[str]) -> list[str]:
     # A function of a whole point that is constant, or has no entry that varies, is possible.
     used = any("[lane]" in line for line in body)
-    return [
-        f"_always_inline void {name}_at(strip *at, size_t lane)",
-        "{",
-        *(f"    {line}" for line in (body if used else ["(void)at, (void)lane;"])),
-        "}",
-        "",
-        *_strip_function(name),
-    ]
+    head = [f"_always_inline void {name}_at(strip *at, size_t lane)", "{"]
+    return [*braced(head, body if used else ["(void)at, (void)lane;"]), "", *_strip_function(name)]
 
 
 def _with_angles(name: str, body: list[str]) -> list[str]:
+    head = [f"_always_inline int64_t {name}_at(strip *at, size_t lane, int exact)", "{"]
     return [
-        f"_always_inline int64_t {name}_at(strip *at, size_t lane, int exact)",
-        "{",
-        *(f"    {line}" for line in (*body, "return far;")),
-        "}",
+        *braced(head, [*body, "return far;"]),
         "",
         f"static void {name}_of_strip(strip *at, size_t count)",
         "{",
@@ -87,37 +99,19 @@ def _strip_function(name: str) -> list[str]:
     ]
 
 
-def _frames(listing: Listing, printer: Printer) -> list[str]:
-    """Return the cosine and sine of each body's angle, a line a body."""
-    lines = [f"// {title}" for title in frames_title(listing.frames)]
-    for frame in listing.frames:
-        if frame.angle is not None:
-            c, s = (item.name for item in frame.values)
-            angle = printer.text(frame.angle)
-            lines += [f"double {c}, {s};", f"far |= cos_sin({angle}, exact, &{c}, &{s});"]
-        else:
-            lines += [
-                f"const double {item.name} = {printer.definition(item.node)};"
-                for item in frame.values
-            ]
-    return lines
-
-
 def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     """Return the functions that factor Phi_q and that solve Phi_q x = right at a point."""
     printer = Printer(C, listing.plan.nodes, listing.names)
     body = solution(replace(WRITE, element="{}[{}][lane]"), listing, printer, _block_call)
-    return [
-        "// What a solve needs of Phi_q, and the determinants of its blocks.",
-        *(f"// {line}" for line in explained(code, listing.plan)),
-        *_plain("factor", factorization(WRITE, code, listing, printer, _block_call)),
-        "",
-        "// x of Phi_q x = right.",
+    head = [
         "_always_inline void solve_at(double (*restrict F)[LANES],",
         "    double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)",
         "{",
-        *(f"    {line}" for line in (body if listing.factors else ["(void)F;", *body])),
-        "}",
+    ]
+    solve = braced(head, body if listing.factors else ["(void)F;", *body])
+    factor = _plain("factor", factorization(WRITE, code, listing, printer, _block_call))
+    return [
+        *solve_statements.solve_functions(code, listing, factor, solve),
         "",
         "// What rates miss of Phi_q q_dot = nu and Phi_q q_ddot = gamma: sums of squares.",
         "_always_inline void missed_at(const strip *at, const double (*weight)[LANES],",

@@ -5,24 +5,23 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from kincompile import criteria, quantities
+from kincompile import quantities
 from kincompile.emitters.c.dialect import C
 from kincompile.emitters.c.functions import WRITE, evaluator, solve_functions
 from kincompile.emitters.c.march import CSolver
+from kincompile.emitters.constants import items, named_lists
 from kincompile.emitters.lines import WIDTH, indented, wrapped
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.printer import ELEMENTARY
+from kincompile.emitters.solver_tables import NUMBERS, solver_tables
 from kincompile.emitters.templates import fill
 from kincompile.quantities import nonzeros_of
 from kincompile.solver.reader import solver, start
-from kincompile.solver.vocabulary import COUNTS, CRITERIA, START_COUNTS, START_CRITERIA
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
 
-    from kincompile.emitters.evaluators import Listing
     from kincompile.emitters.planned_solve import SolveListing
-    from kincompile.emitters.printer import Printer
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
     from kincompile.quantities import Quantity
@@ -62,9 +61,8 @@ evaluators = quantities.kernels
 """The kernels."""
 
 
-def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
-    """Return the lines of a function of a point, and of the one for a strip of points."""
-    return ["", *evaluator(name, code, listing, printer)]
+function = evaluator
+"""The function of a point, and the one for a strip of points."""
 
 
 def files(
@@ -77,7 +75,7 @@ def files(
     body = [_strip(code, lines, called, listing)]
     body.append(fill("c/batch.c.jinja", {**_only(about, "name", "is_planned"), **_batch(code)}))
     if listing is not None:
-        body.append(fill("c/march.c.jinja", {"name": program.name, **_scales(program)}))
+        body.append(fill("c/march.c.jinja", {"name": program.name, **_march(program)}))
     data = {**_without(about, "NAME"), **_tables(code, listing), "body": "".join(body)}
     source = fill("c/module.c.jinja", data)
     guard = f"{program.name.upper()}_H"
@@ -110,7 +108,7 @@ def _without(data: dict[str, Any], *keys: str) -> dict[str, Any]:
 
 def _tables(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]:
     """Return the constants of the source file: names, numbers and the patterns of matrices."""
-    program = code.program
+    program, lists = code.program, named_lists(code.program)
     patterns, entries = [], []
     for quantity in program.quantities:
         values = [code.number(entry.node) for entry in code.entries(quantity.name)]
@@ -137,8 +135,8 @@ def _tables(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]
         "n_factors": 0 if listing is None else len(listing.factors),
         "n_blocks": 0 if listing is None else len(listing.plan.determinants),
         "fingerprint": program.fingerprint,
-        "defaults": _array_lines([repr(item.default) for item in program.parameters]),
-        "guess": _array_lines([repr(item.guess) for item in program.coordinates]),
+        "defaults": _array_lines(lists["DEFAULTS"]),
+        "guess": _array_lines(lists["GUESS"]),
     }
 
 
@@ -227,7 +225,7 @@ def _strip(
     """Return the functions that work on a strip of points, and what they need."""
     largest = 0
     if listing is not None:
-        lines = [*lines, "", *solve_functions(code, listing)]
+        lines = [*lines, *solve_functions(code, listing)]
         sizes = (len(block.rows) for block in listing.plan.blocks)
         largest = max((size for size in sizes if size > listing.plan.straight), default=0)
     data = {
@@ -275,23 +273,10 @@ def _solver(name: str) -> dict[str, str]:
     return {"start": CSolver(start(), name).text(), "solver": CSolver(solver(), name).text()}
 
 
-def _scales(program: Program) -> dict[str, str]:
-    """Return what tells large from small in a march: kinds of coordinates, and the criteria."""
-    units = [item.unit for item in program.coordinates]
-    columns = [body.columns for body in program.bodies]
-    angular = [str(int(turns)) for turns in criteria.turning(units, columns)]
-    free = [str(int(turns)) for turns in criteria.may_turn(units, columns)]
-    most = max(len(program.coordinates), len(program.equations))
-    probe = [repr(value) for value in criteria.probe_of(most).tolist()]
-    known = (*CRITERIA, *COUNTS, *START_CRITERIA, *START_COUNTS)
-    numbers = {name: repr(getattr(criteria, name)) for name in known}
-    redundant = [str(int(name in program.redundant)) for name in program.equations]
-    return {
-        "angular": _array_lines(angular),
-        "may_turn": _array_lines(free),
-        "cover": _array_lines([str(k) for k in criteria.first_of_cover(len(units), columns)]),
-        "probe": _array_lines(probe),
-        "redundant": _array_lines(redundant),
-        **_solver(program.name),
-        **numbers,
+def _march(program: Program) -> dict[str, str]:
+    """Return the solver, and what it judges by."""
+    tables = {
+        name: _array_lines(items(values, ("0", "1")))
+        for name, values in solver_tables(program).items()
     }
+    return {**tables, **_solver(program.name), **{name: repr(x) for name, x in NUMBERS.items()}}

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile import quantities
+from kincompile.emitters import solve_statements
 from kincompile.emitters.javascript.dialect import JAVASCRIPT
-from kincompile.emitters.lines import indented, wrapped
-from kincompile.emitters.planned_solve import explained
+from kincompile.emitters.lines import braced, wrapped
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.solve_statements import block_call, factorization, solution
 from kincompile.emitters.statements import Statements
@@ -23,26 +23,17 @@ if TYPE_CHECKING:
 WRITE = Statements("//", "const {}", "{}[{}]", "")
 
 
-def kernels(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
-    """Return what is computed together; a point alone has no use for all of it at once."""
-    found = quantities.kernels(given)
-    del found["kinematics"]
-    return found
-
-
 def kernel(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
     """Return the function that computes quantities at a point."""
     results = [quantity for quantity, _ in listing.results]
-    body = WRITE.inputs(code.program, listing) + WRITE.frames(listing, printer)
-    body += WRITE.steps(listing, printer) + WRITE.computed(code, listing, printer)
     taken = _taken(*quantities.states_of(results), "t", "p", *results)
-    return ["", *_function(f"{name}_at", "at", taken, body)]
+    return ["", *_function(f"{name}_at", "at", taken, WRITE.evaluation(code, listing, printer))]
 
 
 def single(quantity: Quantity, code: InlineProgram) -> list[str]:
     """Return the function of a quantity, of one point: an array, or an array of rows."""
     name, states = quantity.name, ", ".join(quantity.states)
-    kernel_name = _kernel_of(quantity, code)
+    kernel_name = quantities.kernel_of(quantity, quantities.kernels_apart(code.program.quantities))
     return [
         "",
         f"// {quantity.about}",
@@ -52,26 +43,18 @@ def single(quantity: Quantity, code: InlineProgram) -> list[str]:
     ]
 
 
-def _kernel_of(quantity: Quantity, code: InlineProgram) -> str:
-    found = kernels(code.program.quantities)
-    return next(name for name, own in found.items() if quantity.name in own)
-
-
 def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     """Return the functions that factor Phi_q and that solve Phi_q x = right."""
     printer = Printer(JAVASCRIPT, listing.plan.nodes, listing.names)
     call = block_call(WRITE, "{}({}, [")
     factored = factorization(WRITE, code, listing, printer, call)
     solved = solution(WRITE, listing, printer, call)
-    return [
-        "",
-        "// What a solve needs of Phi_q, and the determinants of its blocks.",
-        *(f"// {line}" for line in explained(code, listing.plan)),
-        *_function("factor_at", "at", _taken("Phi_q", "F", "determinants"), factored),
-        "",
-        "// x of Phi_q x = right.",
-        *_function("solve_at", "F, right, to", [], solved),
-    ]
+    return solve_statements.solve_functions(
+        code,
+        listing,
+        _function("factor_at", "at", _taken("Phi_q", "F", "determinants"), factored),
+        _function("solve_at", "F, right, to", [], solved),
+    )
 
 
 def _taken(*names: str) -> list[str]:
@@ -80,8 +63,7 @@ def _taken(*names: str) -> list[str]:
 
 
 def _function(name: str, arguments: str, first: Sequence[str], body: Sequence[str]) -> list[str]:
-    lines = indented([*first, *body], 1).split("\n")
-    return [f"function {name}({arguments}) {{", *lines, "}"]
+    return braced([f"function {name}({arguments}) {{"], [*first, *body])
 
 
 def vectors(code: InlineProgram) -> list[str]:

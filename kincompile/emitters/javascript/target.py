@@ -11,17 +11,17 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from kincompile import criteria, quantities
+from kincompile.emitters.constants import named_lists, splines
 from kincompile.emitters.javascript.dialect import JAVASCRIPT
 from kincompile.emitters.javascript.functions import (
     WRITE,
     kernel,
-    kernels,
     single,
     solve_functions,
     vectors,
 )
 from kincompile.emitters.javascript.march import JavaScriptSolver
-from kincompile.emitters.lines import indented, quoted, wrapped
+from kincompile.emitters.lines import indented, wrapped
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.templates import fill, read
@@ -30,10 +30,7 @@ from kincompile.solver.reader import solver
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
-    from kincompile.emitters.evaluators import Listing
-    from kincompile.emitters.printer import Printer
     from kincompile.ir.inline import InlineProgram
-    from kincompile.ir.program import Program
 
 DIALECT = JAVASCRIPT
 
@@ -79,13 +76,11 @@ TAKEN_BY_ENVIRONMENT = (
 """Names that a page or node does not let a script declare, or needs itself."""
 
 
-evaluators = kernels
+evaluators = quantities.kernels_apart
 """The functions of a point."""
 
-
-def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
-    """Return the lines of a function of a point."""
-    return kernel(name, code, listing, printer)
+function = kernel
+"""One of them."""
 
 
 def files(
@@ -108,7 +103,7 @@ def files(
         "corners": str(program.corners).lower(),
         "matrices": indented(_matrices(code), 2),
         "variable": NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(program.name),
-        "tables": indented(_tables(program)),
+        "tables": indented(splines(program, "const {} = {{", "[")),
         "table_names": ", ".join(program.tables),
         "vectors": indented(vectors(code), 3),
         "solver": "" if listing is None else _solver(),
@@ -137,19 +132,13 @@ def _solver() -> str:
 
 def _lists(code: InlineProgram) -> dict[str, list[str]]:
     """Return the lines of the module's constant arrays, by name."""
-    program = code.program
-    bodies = (f'["{x.name}", {x.columns.start}, {len(x.columns)}]' for x in program.bodies)
-    lists = {
-        "COORDINATES": quoted(item.name for item in program.coordinates),
-        "EQUATIONS": quoted(program.equations),
-        "PARAMETERS": quoted(item.name for item in program.parameters),
-        "DEFAULTS": wrapped(repr(item.default) for item in program.parameters),
-        "GUESS": wrapped(repr(item.guess) for item in program.coordinates),
-        "OUTPUTS": quoted(item.name for item in program.outputs),
-        "BODIES": wrapped(bodies),
-        "PATTERN": wrapped(f"[{row}, {column}]" for row, column in code.pattern()),
-    }
-    return lists | ({"REDUNDANT": quoted(program.redundant)} if program.redundant else {})
+    program, lists = code.program, named_lists(code.program)
+    lists["OUTPUTS"] = lists.pop("OUTPUTS")
+    lists["BODIES"] = [f'["{x.name}", {x.columns.start}, {len(x.columns)}]' for x in program.bodies]
+    lists["PATTERN"] = [f"[{row}, {column}]" for row, column in code.pattern()]
+    if program.redundant:
+        lists["REDUNDANT"] = [f'"{name}"' for name in program.redundant]
+    return {name: wrapped(own) for name, own in lists.items()}
 
 
 def _matrices(code: InlineProgram) -> list[str]:
@@ -163,16 +152,4 @@ def _matrices(code: InlineProgram) -> list[str]:
             pattern = ["pattern: PATTERN,"] if quantity.name == "Phi_q" else pattern
             own = [f"rows: {rows}, columns: {columns},", *pattern]
             lines += [f"{quantity.name}: {{", *(f"    {line}" for line in own), "},"]
-    return lines
-
-
-def _tables(program: Program) -> list[str]:
-    """Return the tables of splines."""
-    lines = []
-    for name, spline in program.tables.items():
-        lines += [f"const {name} = {{", "    breaks: ["]
-        lines += [f"        {line}" for line in wrapped(repr(x) for x in spline.breaks)]
-        lines += ["    ],", "    pieces: ["]
-        lines += [f"        [{', '.join(map(repr, row))}]," for row in spline.coefficients]
-        lines += ["    ],", "};"]
     return lines

@@ -20,13 +20,13 @@ from kincompile.emitters.numpy.target import (
     public_functions,
     support,
 )
-from kincompile.emitters.numpy.text import solvability_text, tuple_text
+from kincompile.emitters.numpy.text import list_texts, solvability_text, tuple_text
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.target import Emitted
 from kincompile.emitters.templates import fill
 from kincompile.ir.graph import pruned
 from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
-from kincompile.quantities import FORMAT, functions, kernels, states_of
+from kincompile.quantities import FORMAT, functions, kernels_apart, states_of
 from kincompile.structure.blocks import BlockForm
 
 if TYPE_CHECKING:
@@ -171,7 +171,8 @@ class _Module:
         lines.append("}, {")
         for name, source in item.inputs.items():
             self.arrays[f"{item.name}.{names[name]}"] = source.index
-        for kernel, computed in _kernels(self.program).items():
+        # Of right sides alone, because Phi_q is then at hand.
+        for kernel, computed in kernels_apart(self.program.quantities).items():
             if not any(item.outputs[name] for name in computed):
                 continue
             listing, body = self._body(code, computed, names, table)
@@ -239,13 +240,6 @@ class _Module:
         self.code += [f"    {line}" for line in body]
 
 
-def _kernels(program: Program) -> dict[str, tuple[str, ...]]:
-    """Return what is computed together; right sides alone, because Phi_q is then at hand."""
-    found = kernels(program.quantities)
-    del found["kinematics"]
-    return found
-
-
 def _public(program: Program, nonzeros: int) -> Iterator[str]:
     """Yield the public functions: of the quantities, and of those that are given together."""
     for quantity, name, lines in public_functions(program, nonzeros):
@@ -271,6 +265,7 @@ def _data(
 ) -> dict[str, Any]:
     """Return what goes into the template, by slot."""
     program, nonzeros = module.program, len(module.arrays["pattern"])
+    lists = list_texts(program)
     return {
         "title": program.name,
         "name": program.name,
@@ -282,14 +277,12 @@ def _data(
         "k": len(program.parameters),
         "has_outputs": bool(program.outputs),
         "has_moving": bool(module.grouped.moving),
-        "outputs": tuple_text(f'"{item.name}"' for item in program.outputs),
         "loads": tuple_text(f'"{item.name}"' for item in program.loads),
         "output_units": indented(
             wrapped(f'"{item.name}": "{item.unit}"' for item in program.outputs)
         ),
         "solvability": solvability_text(program),
         "is_planned": is_planned,
-        "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "parameter_units": indented(
             wrapped(f'"{item.name}": "{item.unit}"' for item in program.parameters)
         ),
@@ -297,13 +290,13 @@ def _data(
             f'{name} = _data["{name}.breaks"], _data["{name}.coefficients"]'
             for name in program.tables
         ),
-        "defaults": tuple_text((repr(item.default) for item in program.parameters), 62),
+        **{name: lists[name] for name in ("outputs", "parameters", "defaults")},
         "kernels": "\n".join(module.code),
         "functions": "\n".join(_public(program, nonzeros)),
         "patterns": "\n".join(_patterns(program)),
         "quantities": indented(_results(program)),
         "kernel_table": indented(
-            f"{name!r}: {given}," for name, given in _kernels(program).items()
+            f"{name!r}: {given}," for name, given in kernels_apart(program.quantities).items()
         ),
         "frames": indented(frames),
         "groups": indented(groups),

@@ -12,13 +12,14 @@ from kincompile.emitters.numpy.solve import solve_functions
 from kincompile.emitters.numpy.text import (
     assignments,
     element,
+    list_texts,
     packed,
     solvability_text,
     tuple_text,
 )
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.templates import fill
-from kincompile.quantities import FORMAT, kernels, pattern_of, quantity_named, states_of
+from kincompile.quantities import FORMAT, kernel_of, kernels, pattern_of, quantity_named, states_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -112,7 +113,6 @@ def _has(name: str, text: str) -> bool:
 def _constants(code: InlineProgram) -> dict[str, Any]:
     """Return what the head of the module says."""
     program = code.program
-    names = [item.name for item in program.coordinates]
     units = [item.unit for item in program.coordinates]
     units += [item.unit for item in program.parameters]
     units += [item.unit for item in program.outputs]
@@ -122,23 +122,18 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "name": program.name,
         "format": FORMAT,
         "fingerprint": program.fingerprint,
-        "n": len(names),
+        "n": len(program.coordinates),
         "m": len(program.equations),
         "k": len(program.parameters),
         "nonzeros": len(code.pattern()),
-        "coordinates": tuple_text(f'"{name}"' for name in names),
-        "equations": tuple_text(f'"{name}"' for name in program.equations),
         "solvability": solvability_text(program),
         "in_space": any("e0" in body.kernel.letters for body in program.bodies),
         "has_outputs": bool(program.outputs),
         "has_motion": bool(program.motion),
-        "outputs": tuple_text(f'"{item.name}"' for item in program.outputs),
         "loads": tuple_text(f'"{item.name}"' for item in program.loads),
-        "parameters": tuple_text(f'"{item.name}"' for item in program.parameters),
         "bodies": bodies_text(program),
         "units": tuple_text((f'"{unit}"' for unit in units), WIDTH - 44),
-        "defaults": tuple_text((repr(item.default) for item in program.parameters), WIDTH - 34),
-        "guess": tuple_text((repr(item.guess) for item in program.coordinates), WIDTH - 34),
+        **list_texts(program),
         "patterns": "\n".join(_patterns(code)),
         "tables": "\n".join(_tables(program)),
     }
@@ -205,7 +200,7 @@ def _functions(code: InlineProgram) -> Iterator[str]:
         for item in given
     }
     for quantity, name, lines in public_functions(code.program, len(code.pattern())):
-        kernel = next(key for key, own in found.items() if quantity.name in own)
+        kernel = kernel_of(quantity, found)
         computed = found[kernel]
         skip = sum(counts[item] for item in computed[: computed.index(quantity.name)])
         result = _result(name)

@@ -8,6 +8,7 @@ import re
 from collections import deque
 from typing import TYPE_CHECKING
 
+from kincompile.emitters.constants import named_lists
 from kincompile.emitters.lines import WIDTH, broken, indented, pieces, wrapped
 
 if TYPE_CHECKING:
@@ -21,6 +22,13 @@ def tuple_text(items: Iterable[str], room: int = WIDTH - 15) -> str:
     items = list(items)
     text = f"({items[0]},)" if len(items) == 1 else f"({', '.join(items)})"
     return text if len(text) <= room else f"(\n{indented(wrapped(items))}\n)"
+
+
+def list_texts(program: Program) -> dict[str, str]:
+    """Return the lists of names and numbers as tuples, by their names in small letters."""
+    numbers = dict.fromkeys(("DEFAULTS", "GUESS"), WIDTH - 34)
+    lists = named_lists(program).items()
+    return {name.lower(): tuple_text(own, numbers.get(name, WIDTH - 15)) for name, own in lists}
 
 
 def solvability_text(program: Program) -> str:

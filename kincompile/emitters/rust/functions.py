@@ -5,47 +5,36 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from kincompile import quantities
-from kincompile.emitters.lines import indented, wrapped
-from kincompile.emitters.planned_solve import explained
+from kincompile.emitters import solve_statements
+from kincompile.emitters.lines import braced, wrapped
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.rust.dialect import RUST
 from kincompile.emitters.solve_statements import block_call, factorization, solution
 from kincompile.emitters.statements import Statements
+from kincompile.quantities import kernel_of, kernels_apart, pattern_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from kincompile.emitters.evaluators import Listing
     from kincompile.emitters.planned_solve import SolveListing
     from kincompile.ir.inline import InlineProgram
     from kincompile.quantities import Quantity
 
-WRITE = Statements("//", "let {}", "at.{}[{}]", "", kept="{} as u8 as f64", taken="{} != 0.0")
+WRITE = Statements(
+    "//", "let {}", "at.{}[{}]", "", kept="{} as u8 as f64", taken="{} != 0.0", time="let t = at.t;"
+)
 SOLVE = replace(WRITE, element="{}[{}]")
-
-
-def kernels(given: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
-    """Return what is computed together; a point alone has no use for all of it at once."""
-    found = quantities.kernels(given)
-    del found["kinematics"]
-    return found
 
 
 def kernel(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
     """Return the function that computes quantities at a point."""
-    body = WRITE.inputs(code.program, listing)
-    body += ["let t = at.t;"] if "t" in listing.inputs else []
-    body += WRITE.frames(listing, printer) + WRITE.steps(listing, printer)
-    body += WRITE.computed(code, listing, printer)
-    return ["", *_function(f"fn {name}_at(at: &mut Point)", body)]
+    body = WRITE.evaluation(code, listing, printer)
+    return ["", *braced([f"fn {name}_at(at: &mut Point) {{"], body)]
 
 
 def single(quantity: Quantity, code: InlineProgram) -> list[str]:
     """Return the function of a quantity, of one point: an array, or an array of rows."""
     name, states = quantity.name, quantity.states
-    found = kernels(code.program.quantities)
-    kernel_name = next(name for name, own in found.items() if quantity.name in own)
+    kernel_name = kernel_of(quantity, kernels_apart(code.program.quantities))
     rows, *columns = code.program.shape_of(quantity)
     kind = f"[[f64; {columns[0]}]; {rows}]" if columns else f"[f64; {rows}]"
     given = [*(f"{x}: &[f64; N_COORDINATES]" for x in states), "t: f64", "p: &[f64; N_PARAMETERS]"]
@@ -57,10 +46,9 @@ def single(quantity: Quantity, code: InlineProgram) -> list[str]:
         f"{kernel_name}_at(&mut at);",
     ]
     if columns:
-        pattern = "PATTERN" if name == "Phi_q" else f"PATTERN_{name}"
         body += [
             f"let mut matrix = [[0.0; {columns[0]}]; {rows}];",
-            f"for (k, &[i, j]) in {pattern}.iter().enumerate() {{",
+            f"for (k, &[i, j]) in {pattern_of(quantity)}.iter().enumerate() {{",
             f"    matrix[i][j] = at.{name}[k];",
             "}",
             "matrix",
@@ -68,7 +56,7 @@ def single(quantity: Quantity, code: InlineProgram) -> list[str]:
     else:
         body.append(f"at.{name}")
     head = [f"pub fn {name}(", *(f"    {x}," for x in given), f") -> {kind} {{"]
-    return ["", f"/// {quantity.about}", *head, *(f"    {x}" for x in body), "}"]
+    return ["", f"/// {quantity.about}", *braced(head, body)]
 
 
 def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
@@ -76,27 +64,14 @@ def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     printer = Printer(RUST, listing.plan.nodes, listing.names)
     call = block_call(WRITE, "{}::<{}>(&[")
     factored = factorization(WRITE, code, listing, printer, call)
-    solved = [
-        "let mut to = [0.0; N_COORDINATES];",
-        *solution(SOLVE, listing, printer, call),
-        "to",
-    ]
-    return [
-        "",
-        "// What a solve needs of Phi_q, and the determinants of its blocks.",
-        *(f"// {line}" for line in explained(code, listing.plan)),
-        *_function("fn factor_at(at: &mut Point)", factored),
-        "",
-        "// x of Phi_q x = right.",
-        *_function(
-            "fn solve_at(F: &[f64; FACTORS], right: &[f64; N_EQUATIONS]) -> [f64; N_COORDINATES]",
-            solved,
-        ),
-    ]
-
-
-def _function(head: str, body: Sequence[str]) -> list[str]:
-    return [f"{head} {{", *indented(body).split("\n"), "}"]
+    solved = ["let mut to = [0.0; N_COORDINATES];", *solution(SOLVE, listing, printer, call), "to"]
+    given = "F: &[f64; FACTORS], right: &[f64; N_EQUATIONS]"
+    return solve_statements.solve_functions(
+        code,
+        listing,
+        braced(["fn factor_at(at: &mut Point) {"], factored),
+        braced([f"fn solve_at({given}) -> [f64; N_COORDINATES] {{"], solved),
+    )
 
 
 def vectors(code: InlineProgram) -> tuple[list[str], list[str]]:

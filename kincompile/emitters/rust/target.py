@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from kincompile import criteria, quantities
-from kincompile.emitters.lines import indented, quoted, wrapped
+from kincompile import quantities
+from kincompile.emitters.constants import items, named_lists, splines
+from kincompile.emitters.lines import indented, wrapped
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.printer import ELEMENTARY
@@ -14,28 +15,19 @@ from kincompile.emitters.rust.dialect import RUST
 from kincompile.emitters.rust.functions import (
     WRITE,
     kernel,
-    kernels,
     single,
     solve_functions,
     vectors,
 )
-from kincompile.emitters.rust.march import RustSolver
+from kincompile.emitters.rust.march import BASES, RustSolver
+from kincompile.emitters.solver_tables import NUMBERS, solver_tables
 from kincompile.emitters.templates import fill
 from kincompile.solver.reader import solver, start
-from kincompile.solver.vocabulary import (
-    CONSTANTS,
-    COUNTS,
-    CRITERIA,
-    START_COUNTS,
-    START_CRITERIA,
-    STATUSES,
-)
+from kincompile.solver.vocabulary import CONSTANTS, STATUSES
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
+    from collections.abc import Collection, Mapping, Sequence
 
-    from kincompile.emitters.evaluators import Listing
-    from kincompile.emitters.printer import Printer
     from kincompile.ir.inline import InlineProgram
     from kincompile.ir.program import Program
 
@@ -68,13 +60,11 @@ RESERVED: tuple[str, ...] = (
 )  # fmt: skip
 """Names that the functions use."""
 
-evaluators = kernels
+evaluators = quantities.kernels_apart
 """The functions of a point."""
 
-
-def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
-    """Return the lines of a function of a point."""
-    return kernel(name, code, listing, printer)
+function = kernel
+"""One of them."""
 
 
 def files(
@@ -93,7 +83,7 @@ def files(
         "module": module,
         "header": WRITE.heading(code).replace("// ", "//! ").replace("//\n", "//!\n"),
         "constants": indented(_constants(code), 0),
-        "tables": indented(_tables(program), 0),
+        "tables": indented(splines(program, "static {}: Spline = Spline {{", "&["), 0),
         "fields": indented(fields),
         "values": indented(values, 3),
         "march": "" if listing is None else fill("rust/march.rs.jinja", _march(program)),
@@ -103,47 +93,19 @@ def files(
 
 def _constants(code: InlineProgram) -> list[str]:
     """Return the constant arrays of the module."""
-    program = code.program
-    lists = {
-        "COORDINATES": ("&str", quoted(x.name for x in program.coordinates)),
-        "EQUATIONS": ("&str", quoted(program.equations)),
-        "PARAMETERS": ("&str", quoted(x.name for x in program.parameters)),
-        "OUTPUTS": ("&str", quoted(x.name for x in program.outputs)),
-        "DEFAULTS": ("f64", wrapped(repr(x.default) for x in program.parameters)),
-        "GUESS": ("f64", wrapped(repr(x.guess) for x in program.coordinates)),
-    }
-    sizes = [program.coordinates, program.equations, program.parameters, program.outputs]
-    counts = [*map(len, sizes), len(program.parameters), len(program.coordinates)]
     lines = []
-    for (name, (kind, rows)), size in zip(lists.items(), counts, strict=True):
-        lines += _array(name, kind, size, rows)
-    for quantity in program.quantities:
+    for name, own in named_lists(code.program).items():
+        lines += _array(name, "f64" if name in ("DEFAULTS", "GUESS") else "&str", own)
+    for quantity in code.program.quantities:
         if quantity.is_matrix:
-            places = code.pattern(quantity.name)
-            rows = wrapped(f"[{i}, {j}]" for i, j in places)
-            name = "PATTERN" if quantity.name == "Phi_q" else f"PATTERN_{quantity.name}"
-            lines += _array(name, "[usize; 2]", len(places), rows)
+            places = [f"[{i}, {j}]" for i, j in code.pattern(quantity.name)]
+            lines += _array(quantities.pattern_of(quantity), "[usize; 2]", places)
     return lines
 
 
-def _array(name: str, kind: str, size: int, rows: Iterable[str]) -> list[str]:
-    return [f"pub const {name}: [{kind}; {size}] = [", *(f"    {x}" for x in rows), "];"]
-
-
-def _truths(values: Iterable[bool]) -> Iterable[str]:
-    return wrapped(str(x).lower() for x in values)
-
-
-def _tables(program: Program) -> list[str]:
-    """Return the tables of splines."""
-    lines = []
-    for name, spline in program.tables.items():
-        lines += [f"static {name}: Spline = Spline {{", "    breaks: &["]
-        lines += [f"        {line}" for line in wrapped(repr(x) for x in spline.breaks)]
-        lines += ["    ],", "    pieces: &["]
-        lines += [f"        &[{', '.join(map(repr, row))}]," for row in spline.coefficients]
-        lines += ["    ],", "};"]
-    return lines
+def _array(name: str, kind: str, own: Sequence[str]) -> list[str]:
+    head = f"pub const {name}: [{kind}; {len(own)}] = ["
+    return [head, *(f"    {x}" for x in wrapped(own)), "];"]
 
 
 @cache
@@ -154,18 +116,11 @@ def _solver() -> str:
 
 def _march(program: Program) -> dict[str, Any]:
     """Return the solver, and what it judges by."""
-    units = [item.unit for item in program.coordinates]
-    columns = [body.columns for body in program.bodies]
-    n, m = len(program.coordinates), len(program.equations)
-    probe = criteria.probe_of(max(n, m)).tolist()
-    tables = _array("ANGULAR", "bool", n, _truths(criteria.turning(units, columns)))
-    repeats = (x in program.redundant for x in program.equations)
-    tables += _array("IS_REDUNDANT", "bool", m, _truths(repeats))
-    tables += _array("PROBE", "f64", len(probe), wrapped(map(repr, probe)))
-    tables += _array("MAY_TURN", "bool", n, _truths(criteria.may_turn(units, columns)))
-    tables += _array("COVER", "usize", n, wrapped(map(str, criteria.first_of_cover(n, columns))))
-    numbers = [f"const {x}: f64 = {getattr(criteria, x)!r};" for x in (*CRITERIA, *START_CRITERIA)]
-    numbers += [f"const {x}: usize = {getattr(criteria, x)};" for x in (*COUNTS, *START_COUNTS)]
+    tables, numbers = [], []
+    for name, values in solver_tables(program).items():
+        tables += _array(name, BASES[CONSTANTS[name].base], items(values))
+    for name, value in NUMBERS.items():
+        numbers.append(f"const {name}: {BASES[CONSTANTS[name].base]} = {value!r};")
     numbers += [f"pub const {x}: usize = {number};" for x, number in STATUSES.items()]
     return {
         "tables": indented(tables, 0).replace("pub const", "const"),

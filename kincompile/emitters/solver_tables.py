@@ -1,0 +1,32 @@
+"""What a printed solver judges by, as values that each language writes down."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile import criteria
+from kincompile.solver.vocabulary import COUNTS, CRITERIA, START_COUNTS, START_CRITERIA
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from kincompile.ir.program import Program
+
+NUMBERS: Mapping[str, float] = {
+    name: getattr(criteria, name) for name in (*CRITERIA, *START_CRITERIA, *COUNTS, *START_COUNTS)
+}
+"""The criteria of march and start by name; the counts are whole numbers."""
+
+
+def solver_tables(program: Program) -> dict[str, Sequence[float]]:
+    """Return the tables of `vocabulary.TABLES` but PATTERN by name, of a mechanism."""
+    units = [item.unit for item in program.coordinates]
+    columns = [body.columns for body in program.bodies]
+    most = max(len(units), len(program.equations))
+    return {
+        "ANGULAR": criteria.turning(units, columns),
+        "IS_REDUNDANT": [name in program.redundant for name in program.equations],
+        "PROBE": criteria.probe_of(most).tolist(),
+        "MAY_TURN": criteria.may_turn(units, columns),
+        "COVER": criteria.first_of_cover(len(units), columns),
+    }
