@@ -33,6 +33,8 @@ class Statements:
     continued: str = ""
     ending: str = ";"
     time: str = ""  # what takes the time, where that is not given by itself
+    # pair: what computes cosine and sine of an angle in one go, ``{0}`` and ``{1}`` of ``{2}``
+    pair: tuple[str, ...] = ()
     # kept, taken: how a truth is kept among numbers, and how it is taken from there
     kept: str = "{}"
     taken: str = "{}"
@@ -100,6 +102,10 @@ class Statements:
         titles = frames_title(listing.frames)
         lines = [f"{self.comment} {x.replace('[[c, -s], [s, c]]', self.plane)}" for x in titles]
         for frame in listing.frames:
+            if self.pair and frame.angle is not None:
+                given = *(item.name for item in frame.values), printer.text(frame.angle)
+                lines += [line.format(*given) for line in self.pair]
+                continue
             for item in frame.values:
                 lines += self._value(item.name, printer.definition(item.node))
         return lines

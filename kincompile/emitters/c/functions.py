@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from kincompile.emitters import solve_statements
 from kincompile.emitters.c.dialect import C
-from kincompile.emitters.evaluators import frames_title
 from kincompile.emitters.headings import title
 from kincompile.emitters.lines import braced
 from kincompile.emitters.printer import Printer
@@ -22,28 +21,11 @@ if TYPE_CHECKING:
     from kincompile.ir.inline import InlineProgram
 
 
-class CStatements(Statements):
-    """Statements of C, where cosine and sine of an angle are one call."""
-
-    def frames(self, listing: Listing, printer: Printer) -> list[str]:
-        """Return the cosine and sine of each body's angle, a line a body."""
-        lines = [f"// {title}" for title in frames_title(listing.frames)]
-        for frame in listing.frames:
-            if frame.angle is not None:
-                c, s = (item.name for item in frame.values)
-                angle = printer.text(frame.angle)
-                lines += [f"double {c}, {s};", f"far |= cos_sin({angle}, exact, &{c}, &{s});"]
-            else:
-                lines += [
-                    f"const double {item.name} = {printer.definition(item.node)};"
-                    for item in frame.values
-                ]
-        return lines
-
-
-WRITE = CStatements(
-    "//", "const double {}", "at->{}[{}][lane]", "", time="const double t = at->t[lane];"
-)
+WRITE = Statements(
+    "//", "const double {}", "at->{}[{}][lane]", "",
+    time="const double t = at->t[lane];",
+    pair=("double {0}, {1};", "far |= cos_sin({2}, exact, &{0}, &{1});"),
+)  # fmt: skip
 
 ABOUT = {
     "position": "Phi and Phi_q in one go: a step of Newton's method.",

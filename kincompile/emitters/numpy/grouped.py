@@ -26,7 +26,7 @@ from kincompile.emitters.target import Emitted
 from kincompile.emitters.templates import fill
 from kincompile.ir.graph import pruned
 from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
-from kincompile.quantities import FORMAT, functions, kernels_apart, states_of
+from kincompile.quantities import FORMAT, functions, kernels_apart, pattern_of, states_of
 from kincompile.structure.blocks import BlockForm
 
 if TYPE_CHECKING:
@@ -145,10 +145,10 @@ class _Module:
             whole, numbers = np.unique(entries @ (width, 1), return_inverse=True)
             constants = np.zeros(whole.size)
             np.add.at(constants, numbers[~computed], values[~computed])
-            suffix = "" if quantity.name == "Phi_q" else f"_{quantity.name}"
-            self.arrays[f"pattern{suffix}"] = np.stack(divmod(whole, width), axis=1)
-            self.arrays[f"constants{suffix}"] = constants
-            if not suffix:
+            name = pattern_of(quantity)
+            self.arrays[_array_of(name)] = np.stack(divmod(whole, width), axis=1)
+            self.arrays[_array_of(name, "constants")] = constants
+            if quantity.name == "Phi_q":
                 self.varies = np.full(whole.size, False)
                 self.varies[numbers[computed]] = True
         start = 0
@@ -304,27 +304,25 @@ def _data(
     }
 
 
-def _matrices(program: Program) -> list[tuple[Quantity, str]]:
-    """Return the matrices, and what the names of their arrays end in."""
-    matrices = [item for item in program.quantities if item.is_matrix]
-    return [(item, "" if item.name == "Phi_q" else f"_{item.name}") for item in matrices]
-
-
 def _patterns(program: Program) -> Iterator[str]:
     """Yield the lines that read the patterns of matrices."""
-    for _, suffix in _matrices(program):
-        yield f'PATTERN{suffix} = np.array(_data["pattern{suffix}"], dtype=int)'
+    for name in (pattern_of(item) for item in program.quantities if item.is_matrix):
+        yield f'{name} = np.array(_data["{_array_of(name)}"], dtype=int)'
+
+
+def _array_of(pattern: str, word: str = "pattern") -> str:
+    """Return the array that a pattern, or another word of its matrix, is read from."""
+    return pattern.replace("PATTERN", word, 1)
 
 
 def _results(program: Program) -> Iterator[str]:
     """Yield the lines of the table of quantities."""
-    suffixes = dict(_matrices(program))
     for item in program.quantities:
         shape = ", ".join(map(str, program.shape_of(item)))
         own = "None" if item.rows == "equations" and not item.adds else "0.0"
-        shape, suffix = f"{shape}" if item.is_matrix else f"{shape},", suffixes.get(item)
-        if suffix is not None:
-            own = f'_data["constants{suffix}"], PATTERN{suffix}'
+        if item.is_matrix:
+            own = f'_data["{_array_of(pattern_of(item), "constants")}"], {pattern_of(item)}'
+        shape += "" if item.is_matrix else ","
         yield f'"{item.name}": Quantity(({shape}), {item.adds}, {own}),'
 
 

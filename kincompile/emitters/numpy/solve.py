@@ -10,6 +10,7 @@ from kincompile.emitters.numpy.text import assignments, tuple_text
 from kincompile.emitters.planned_solve import explained
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.schedule import Assignment
+from kincompile.emitters.solve_statements import operands
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -62,15 +63,11 @@ def _steps(steps: Iterable[Assignment | BlockCall], printer: Printer) -> list[st
         function = "solve" if step.right else "determinant"
         lines += assignments(texts)
         lines.append(f"{', '.join(step.names)} = f.block_{function}({step.size}, (")
-        lines += _indented(step.matrix, printer)
-        lines += ["), (", *_indented(step.right, printer)] if step.right else []
+        lines += operands(step.matrix, printer)
+        lines += ["), (", *operands(step.right, printer)] if step.right else []
         lines.append("))")
         texts = []
     return lines + assignments(texts)
-
-
-def _indented(nodes: Iterable[int], printer: Printer) -> list[str]:
-    return [f"    {line}" for line in wrapped([printer.text(node) for node in nodes])]
 
 
 def _unpack(names: list[str], vector: str) -> list[str]:

@@ -228,8 +228,8 @@ def public_functions(
 def support(called: Collection[str], *, has_large_blocks: bool) -> dict[str, str]:
     """Return the parts that both forms of a module have in common, by slot."""
     functions = {
-        "scalar_functions": indented(_scalar_functions(sorted(called))),
-        "array_functions": indented(_array_functions(sorted(called))),
+        "scalar_functions": _class_body(called, SCALAR_FUNCTIONS, "math"),
+        "array_functions": _class_body(called, FUNCTIONS, "np"),
         "has_frames": "cos_sin" in called,
         "has_angles": "atan2" in called,
         "has_large_blocks": has_large_blocks,
@@ -238,14 +238,9 @@ def support(called: Collection[str], *, has_large_blocks: bool) -> dict[str, str
     return {name: fill(f"numpy/{name}.py.jinja", data).rstrip() for name, data in files.items()}
 
 
-def _scalar_functions(called: Iterable[str]) -> list[str]:
-    """Return a class body that maps the functions called to those of `math`."""
-    return [f"{name} = {SCALAR_FUNCTIONS.get(name, f'math.{name}')}" for name in called]
-
-
-def _array_functions(called: Iterable[str]) -> list[str]:
-    """Return a class body that maps the functions called to those of NumPy."""
-    return [f"{name} = {FUNCTIONS.get(name, f'np.{name}')}" for name in called]
+def _class_body(called: Iterable[str], own: Mapping[str, str], module: str) -> str:
+    """Return a class body that maps the functions called to a module's, or to our own."""
+    return indented(f"{name} = {own.get(name, f'{module}.{name}')}" for name in sorted(called))
 
 
 def _tables(program: Program) -> list[str]:

@@ -16,6 +16,7 @@ from kincompile.emitters.octave.dialect import NAMES, OCTAVE
 from kincompile.emitters.planned_solve import schedule_determinants
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.solve_statements import factorization
+from kincompile.emitters.solver_tables import solver_tables
 from kincompile.emitters.statements import Statements
 from kincompile.emitters.templates import fill
 from kincompile.errors import InputError, UnsupportedError
@@ -237,11 +238,9 @@ def _criteria(names: Iterable[str]) -> dict[str, str]:
 def _assembly(code: InlineProgram) -> str:
     """Return the function that finds the position at the first time."""
     program = code.program
-    units = [item.unit for item in program.coordinates]
-    columns = [body.columns for body in program.bodies]
+    tables, columns = solver_tables(program), [body.columns for body in program.bodies]
     angles, free = (
-        [k for k, turns in enumerate(known(units, columns)) if turns]
-        for known in (criteria.turning, criteria.may_turn)
+        [k for k, turns in enumerate(tables[name]) if turns] for name in ("ANGULAR", "MAY_TURN")
     )
     determinants = "\n".join(_determinants(code))
     data = {

@@ -49,18 +49,17 @@ class RustSolver(OneLane):
 
     def kind(self, kind: Type) -> str:
         """Return a type; a large matrix is not on the stack."""
-        text = BASES.get(kind.base, kind.base)
-        if kind.dims[:1] and kind.dims[0] in ROOM:
-            return f"Vec<[{text}; {kind.dims[1]}]>"
-        for size in reversed([x for x in kind.dims if x != LANE]):
-            text = f"[{text}; {SIZES.get(size, size)}]"
-        return text
+        return self.sized(kind, BASES.get(kind.base, kind.base), "Vec<[{0}; {2}]>")
 
     def zero(self, kind: Type) -> str:
         """Return the first value of a field."""
-        text = ZEROS[kind.base]
+        return self.sized(kind, ZEROS[kind.base], "vec![[{0}; {2}]; {1}]")
+
+    @staticmethod
+    def sized(kind: Type, text: str, large: str) -> str:
+        """Return an array of a type, or of values; a large matrix has a form of its own."""
         if kind.dims[:1] and kind.dims[0] in ROOM:
-            return f"vec![[{text}; {kind.dims[1]}]; {kind.dims[0]}]"
+            return large.format(text, *kind.dims)
         for size in reversed([x for x in kind.dims if x != LANE]):
             text = f"[{text}; {SIZES.get(size, size)}]"
         return text
