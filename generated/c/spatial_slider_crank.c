@@ -710,16 +710,16 @@ _always_inline void outputs_q_at(strip *at, size_t lane)
     const double rod = at->p[1][lane];
     // body frames: A = (e0^2 - e^T e) I + 2 e e^T + 2 e0 e~
     const double A11_rod = square(e0_rod) - square(e3_rod) + (square(e1_rod) - square(e2_rod));
-    // 0  Point "A": 
+    // 0  Point "A":
     const double rod_2 = rod / 2.0;
     const double A_2 = 2.0 * e0_rod * rod_2;
     const double A_3 = 2.0 * e1_rod * rod_2;
     const double A_4 = 2.0 * e2_rod * rod_2;
     const double A_5 = 2.0 * e3_rod * rod_2;
-    // 3  Output "transmission": 
+    // 3  Output "transmission":
     const double transmission_1 = rod * sqrt(1.0 - square((x_slider - (x_rod - A11_rod * rod_2)) / rod));
     const double transmission_2 = 1.0 / transmission_1;
-    // 0  Point "A": 
+    // 0  Point "A":
     at->outputs_q[1][lane] = -A_2;  // x_A by e0_rod
     at->outputs_q[2][lane] = -A_3;  // x_A by e1_rod
     at->outputs_q[3][lane] = A_4;  // x_A by e2_rod
@@ -732,7 +732,7 @@ _always_inline void outputs_q_at(strip *at, size_t lane)
     at->outputs_q[12][lane] = -A_5;  // z_A by e1_rod
     at->outputs_q[13][lane] = A_2;  // z_A by e2_rod
     at->outputs_q[14][lane] = -A_3;  // z_A by e3_rod
-    // 3  Output "transmission": 
+    // 3  Output "transmission":
     at->outputs_q[15][lane] = transmission_2;  // transmission by x_rod
     at->outputs_q[16][lane] = -A_2 / transmission_1;  // transmission by e0_rod
     at->outputs_q[17][lane] = -A_3 / transmission_1;  // transmission by e1_rod
@@ -1165,7 +1165,7 @@ _always_inline void observe_at(strip *at, size_t lane)
     const double A11_rod = square(e0_rod) - square(e3_rod) + (square(e1_rod) - square(e2_rod));
     const double A21_rod = e1_rod * frame_1 + e0_rod * frame_2;
     const double A31_rod = e1_rod * frame_2 - e0_rod * frame_1;
-    // 0  Point "A": 
+    // 0  Point "A":
     const double rod_2 = rod / 2.0;
     const double x_A = x_rod - A11_rod * rod_2;
     const double A_3 = e0_rod_dot + e0_rod_dot;
@@ -1182,31 +1182,31 @@ _always_inline void observe_at(strip *at, size_t lane)
         - (e0_rod * A_8 - e3_rod * A_9 + (e1_rod * A_10 - e2_rod * A_11)) * rod_2;
     const double A_13 = A_6 + A_6;
     const double A_14 = A_4 + A_4;
-    // 3  Output "transmission": 
+    // 3  Output "transmission":
     const double transmission_1 = x_slider - x_A;
     const double transmission_2 = transmission_1 / rod;
     const double transmission_3 = x_slider_dot - x_A_dot;
     const double transmission_4 = sqrt(1.0 - square(transmission_2));
     const double transmission_5 = rod * transmission_4;
-    // 0  Point "A": 
+    // 0  Point "A":
     at->outputs[0][lane] = x_A;  // x_A
     at->outputs[1][lane] = y_rod - A21_rod * rod_2;  // y_A
     at->outputs[2][lane] = z_rod - A31_rod * rod_2;  // z_A
-    // 3  Output "transmission": 
+    // 3  Output "transmission":
     at->outputs[3][lane] = acos(transmission_2);  // transmission
-    // 0  Point "A": 
+    // 0  Point "A":
     at->outputs_dot[0][lane] = x_A_dot;  // x_A
     at->outputs_dot[1][lane] = y_rod_dot - (e1_rod * A_6 + A_5 * e2_rod + (e0_rod * A_4 + A_3 * e3_rod)) * rod_2;  // y_A
     at->outputs_dot[2][lane] = z_rod_dot - (e1_rod * A_4 + A_5 * e3_rod - (e0_rod * A_6 + A_3 * e2_rod)) * rod_2;  // z_A
-    // 3  Output "transmission": 
+    // 3  Output "transmission":
     at->outputs_dot[3][lane] = -transmission_3 / transmission_5;  // transmission
-    // 0  Point "A": 
+    // 0  Point "A":
     at->outputs_ddot[0][lane] = x_A_ddot;  // x_A
     at->outputs_ddot[1][lane] = y_rod_ddot - (e1_rod_dot * A_13 + e0_rod_dot * A_14) * rod_2
         - (e1_rod * A_11 + A_10 * e2_rod + (e0_rod * A_9 + A_8 * e3_rod)) * rod_2;  // y_A
     at->outputs_ddot[2][lane] = z_rod_ddot - (e1_rod_dot * A_14 - e0_rod_dot * A_13) * rod_2
         - (e1_rod * A_9 + A_10 * e3_rod - (e0_rod * A_11 + A_8 * e2_rod)) * rod_2;  // z_A
-    // 3  Output "transmission": 
+    // 3  Output "transmission":
     at->outputs_ddot[3][lane] = -((x_slider_ddot - x_A_ddot) / transmission_5
             + square(transmission_3) * transmission_1 / (square(rod) * rod * (square(transmission_4) * transmission_4)));  // transmission
 }
