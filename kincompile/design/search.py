@@ -155,7 +155,7 @@ class Search:
         return scores
 
     def _own_defaults(self) -> Array:
-        p = np.array(self.module.DEFAULTS, dtype=np.float64)
+        p = code_of(self.module).defaults.copy()
         for name, value in self.fixed.items():
             p[self.module.PARAMETERS.index(name)] = value
         return p

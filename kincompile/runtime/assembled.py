@@ -50,7 +50,7 @@ def first_position(inputs: Inputs) -> tuple[Inputs, Begin]:
     parameters and that position as the guess, as a chunk of a sweep has them.
     """
     time = float(inputs.t[0])
-    for p in (inputs.p, np.array(inputs.code.module.DEFAULTS, dtype=np.float64)):
+    for p in (inputs.p, inputs.code.defaults):
         own = replace(inputs, p=p)
         equations = problem(inputs.code, p, inputs.guess, time)
         march = March(equations, equations.engine, inputs.tolerance)

@@ -80,7 +80,7 @@ class Layout:
         names = {item.column for item in measured}
         whole = np.flatnonzero(solution.good.all(axis=1)).tolist() if measured else []
         motions = [solution.variant(number) for number in whole]
-        sets = np.array(list(solution.parameters.values())).T[whole]
+        sets = solution.p[whole]
         code = code_of(solution.require_module("its measures"))
         measures = measures_together(motions, code, sets, names)
         for number, several in zip(whole, measures, strict=True):

@@ -159,6 +159,12 @@ class MotionTable:
         raise NotImplementedError
 
     @property
+    def p(self) -> NDArray[np.float64]:
+        """The parameters in the order of the mechanism, shape (k,), of variants (B, k)."""
+        values = np.array(list(self.parameters.values()), dtype=np.float64)
+        return values.reshape(len(self.parameters), *self.q.shape[:-2]).T
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of all that has a column: the coordinates, then the outputs."""
         return (*self.coordinates, *self.observed.names)

@@ -19,10 +19,9 @@ from kincompile.html import Shown
 from kincompile.names import listed, multiplier
 from kincompile.runtime.engine.code import FORCES, JOINTS, code_of
 from kincompile.runtime.engine.dense import powers_of_rows
-from kincompile.runtime.engine.planned import trusted
-from kincompile.runtime.memory import empty
 from kincompile.runtime.results.columns import largest
 from kincompile.runtime.results.force_measures import ForceMeasures, force_measures
+from kincompile.runtime.results.observed import Points
 from kincompile.runtime.results.orientation import orientation
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.tables import indented, table
@@ -37,9 +36,6 @@ if TYPE_CHECKING:
 
 BALANCED = 1e-7
 """Part of the largest force up to which the equations may be out of balance."""
-
-BLOCK = 2000
-"""Points at a time where singular values are taken."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -302,9 +298,9 @@ def forces(solution: Solution) -> Forces:
     require_solution(solution)
     code = code_of(solution.require_module("its forces"))
     joints = _joints(code)
-    points = _Points.of(solution, code)
-    names, units, found, shared = points.forces()
-    if np.isnan(found).any() and (text := points.without_loads()):
+    points = Points.of(solution)
+    names, units, found, shared = _forces(code, points)
+    if np.isnan(found).any() and (text := _without_loads(code, points)):
         warnings.warn(text, SingularConfigurationWarning, stacklevel=2)
     values = np.moveaxis(found.reshape(len(names), *solution.q.shape[:-1]), 0, -1)
     m = len(solution.equations)
@@ -333,119 +329,85 @@ def _joints(code: Compiled) -> Mapping[str, tuple[str, ...]]:
     return code.request(JOINTS)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Points:
-    """A batch of L points of a motion."""
+def _forces(
+    code: Compiled, points: Points
+) -> tuple[tuple[str, ...], dict[str, str], Array, tuple[str, ...]]:
+    """Return names, units, values (K, L) of multipliers and forces, and what is shared."""
+    names, units = _names(code)
+    left = finite = np.isfinite(points.q_ddot.sum(axis=0))
+    if (planned := code.request(FORCES, True)) is not None:
+        (found,), is_trusted = points.solved(planned, len(names), 1)
+        left = finite & ~is_trusted
+    else:
+        found = np.empty((len(names), points.t.size))
+    if not finite.all():
+        found[:, ~finite] = np.nan
+    shared = np.zeros(len(names), dtype=bool)
+    for own, some in points.parts(left):
+        part, loose = _by_matrices(code, some)
+        found[:, own] = part.T
+        shared |= loose
+    return names, units, found, tuple(np.array(names)[shared].tolist())
 
-    code: Compiled
-    p: Array
-    t: Array
-    q: Array
-    q_dot: Array
-    q_ddot: Array
 
-    @classmethod
-    def of(cls, solution: Solution, code: Compiled) -> _Points:
-        """Return the points of a motion, of all variants one after the other."""
-        shape, n = solution.q.shape[:-1], len(code.coordinates)
-        p = np.array(list(solution.parameters.values()), dtype=np.float64).T
-        if len(shape) > 1:
-            p = np.repeat(p.reshape(shape[0], len(solution.parameters)), shape[-1], axis=0)
-        states = (part.reshape(-1, n) for part in (solution.q, solution.q_dot, solution.q_ddot))
-        return cls(code, p, np.broadcast_to(solution.t, shape).ravel(), *states)
+def _names(code: Compiled) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Return names and units of the multipliers and forces."""
+    own = tuple(multiplier(name) for name in code.equations)
+    if (planned := code.request(FORCES, True)) is not None:
+        names = planned.outputs[planned.outputs.index(own[0]) :]
+        return names, {name: planned.units[name] for name in names}
+    given = code.request(FORCES, False)
+    assert given is not None
+    units = dict.fromkeys(own, "") | {name: given.units[name] for name in given.outputs}
+    return (*own, *given.outputs), units
 
-    def at(self, some: NDArray[Any]) -> _Points:
-        """Return some of the points."""
-        p = self.p if self.p.ndim == 1 else self.p[some]
-        states = (state[some] for state in (self.q, self.q_dot, self.q_ddot))
-        return _Points(self.code, p, self.t[some], *states)
 
-    def forces(self) -> tuple[tuple[str, ...], dict[str, str], Array, tuple[str, ...]]:
-        """Return names, units, values (K, L) of multipliers and forces, and what is shared."""
-        names, units = self._names()
-        finite = np.isfinite(self.q_ddot.sum(axis=-1))
-        left = finite
-        if (planned := self.code.request(FORCES, True)) is not None:
-            values = self.outputs_of(planned, self.p)
-            blocks = len(values) - len(names)
-            found, left = values[blocks:], finite & ~trusted(values[0], values[1:blocks])
-        else:
-            found = np.empty((len(names), self.t.size))
-        if not finite.all():
-            found[:, ~finite] = np.nan
-        shared = np.zeros(len(names), dtype=bool)
-        numbers = np.flatnonzero(left)
-        for start in range(0, numbers.size, BLOCK):
-            own = numbers[start : start + BLOCK]
-            part, loose = self.at(own).by_matrices()
-            found[:, own] = part.T
-            shared |= loose
-        return names, units, found, tuple(np.array(names)[shared].tolist())
+def _without_loads(code: Compiled, points: Points) -> str:
+    """Say where the loads on which bodies have no value; "" where all have."""
+    at = points.at(np.flatnonzero(np.isfinite(points.q_ddot.sum(axis=0))))
+    with np.errstate(all="ignore"):
+        bad = ~np.isfinite(code.Q(at.q.T, at.q_dot.T, at.t, at.p.T))
+    if not bad.any():
+        return ""
+    owners = code.owners()
+    names = np.array([owners[name] for name in code.coordinates])[bad.any(axis=0)]
+    t = at.t[int(np.argmax(bad.any(axis=1)))]
+    return no_value(code.name, tuple(names.tolist()), float(t))
 
-    def without_loads(self) -> str:
-        """Say where the loads on which bodies have no value; "" where all have."""
-        code, known = self.code, np.isfinite(self.q_ddot.sum(axis=-1))
-        at = self.at(np.flatnonzero(known))
-        with np.errstate(all="ignore"):
-            Q = code.Q(at.q, at.q_dot, at.t, at.p)
-        bad = ~np.isfinite(Q)
-        if not bad.any():
-            return ""
-        owners = code.owners()
-        names = np.array([owners[name] for name in code.coordinates])[bad.any(axis=0)]
-        t = at.t[int(np.argmax(bad.any(axis=1)))]
-        return no_value(code.name, tuple(names.tolist()), float(t))
 
-    def outputs_of(self, code: Compiled, p: Array) -> Array:
-        """Return the outputs of some code at the points, shape (K, L)."""
-        found = empty((1, len(code.outputs), self.t.size))
-        assert code.observe_into is not None
-        with np.errstate(all="ignore"):
-            code.observe_into((self.q.T, self.q_dot.T, self.q_ddot.T), self.t, p.T, found)
-        return np.asarray(found[0])
+def _by_matrices(own: Compiled, points: Points) -> tuple[Array, NDArray[np.bool_]]:
+    """Return values by singular values, (L, K), and which of them redundant joints share."""
+    q, q_dot, t, p = points.q.T, points.q_dot.T, points.t, points.p.T
+    matrix = own.Phi_q(q, t, p)
+    powers = powers_of_rows(matrix)
+    matrix = powers[:, :, np.newaxis] * matrix
+    inertia = np.einsum("lij,lj->li", own.M(q, t, p), points.q_ddot.T)
+    loads = own.Q(q, q_dot, t, p)
+    sides = loads - inertia
+    left, values, right = np.linalg.svd(matrix, full_matrices=True)
+    zero = values <= RANK * values[:, :1]
+    inverse = np.where(zero, 0.0, 1 / np.where(zero, 1.0, values))
+    size = values.shape[1]
+    parts = inverse * np.einsum("lij,lj->li", right[:, :size], sides)
+    factors = np.einsum("lij,lj->li", left[:, :, :size], parts)
+    # Multipliers that do no work, mixed so that each shows wherever one of them does.
+    idle = np.concatenate((zero, np.ones((len(zero), len(left[0]) - size), dtype=bool)), axis=1)
+    mixed = np.where(idle, probe_of(idle.shape[1]), 0.0)
+    loose = powers * np.einsum("lij,lj->li", left, mixed)
+    moved = np.abs(_given(own, points, loose) - _given(own, points, 0 * loose))
+    found = _given(own, points, powers * factors)
+    is_shared = moved > HALF * np.abs(loose).max(axis=-1, keepdims=True, initial=0.0)
+    rest = np.abs(np.einsum("lij,li->lj", matrix, factors) - sides).max(axis=-1)
+    off = rest > BALANCED * (np.abs(loads) + np.abs(inertia)).max(axis=-1, initial=TINY)
+    found[is_shared] = np.nan
+    found[off] = np.nan
+    return found, np.asarray(is_shared[~off].any(axis=0))
 
-    def _names(self) -> tuple[tuple[str, ...], dict[str, str]]:
-        """Return names and units of the multipliers and forces."""
-        own = tuple(multiplier(name) for name in self.code.equations)
-        if (planned := self.code.request(FORCES, True)) is not None:
-            names = planned.outputs[planned.outputs.index(own[0]) :]
-            return names, {name: planned.units[name] for name in names}
-        code = self.code.request(FORCES, False)
-        assert code is not None
-        names = (*own, *code.outputs)
-        return names, dict.fromkeys(own, "") | {name: code.units[name] for name in code.outputs}
 
-    def by_matrices(self) -> tuple[Array, NDArray[np.bool_]]:
-        """Return values by singular values, and which of them redundant joints share."""
-        own, given = self.code, self.code.request(FORCES, False)
-        assert given is not None
-        matrix = own.Phi_q(self.q, self.t, self.p)
-        powers = powers_of_rows(matrix)
-        matrix = powers[:, :, np.newaxis] * matrix
-        inertia = np.einsum("lij,lj->li", own.M(self.q, self.t, self.p), self.q_ddot)
-        loads = own.Q(self.q, self.q_dot, self.t, self.p)
-        sides = loads - inertia
-        left, values, right = np.linalg.svd(matrix, full_matrices=True)
-        zero = values <= RANK * values[:, :1]
-        inverse = np.where(zero, 0.0, 1 / np.where(zero, 1.0, values))
-        size = values.shape[1]
-        parts = inverse * np.einsum("lij,lj->li", right[:, :size], sides)
-        factors = np.einsum("lij,lj->li", left[:, :, :size], parts)
-        # Multipliers that do no work, mixed so that each shows wherever one of them does.
-        idle = np.concatenate((zero, np.ones((len(zero), len(left[0]) - size), dtype=bool)), axis=1)
-        mixed = np.where(idle, probe_of(idle.shape[1]), 0.0)
-        loose = powers * np.einsum("lij,lj->li", left, mixed)
-        moved = np.abs(self._given(given, loose) - self._given(given, 0 * loose))
-        found = self._given(given, powers * factors)
-        is_shared = moved > HALF * np.abs(loose).max(axis=-1, keepdims=True, initial=0.0)
-        rest = np.abs(np.einsum("lij,li->lj", matrix, factors) - sides).max(axis=-1)
-        off = rest > BALANCED * (np.abs(loads) + np.abs(inertia)).max(axis=-1, initial=TINY)
-        found[is_shared] = np.nan
-        found[off] = np.nan
-        return found, np.asarray(is_shared[~off].any(axis=0))
-
-    def _given(self, code: Compiled, factors: Array) -> Array:
-        """Return multipliers and the forces that they give, shape (L, m + K)."""
-        p = np.broadcast_to(self.p, (self.t.size, self.p.shape[-1]))
-        both = np.concatenate((p, factors), axis=-1)
-        return np.concatenate((factors, self.outputs_of(code, both).T), axis=-1)
+def _given(own: Compiled, points: Points, factors: Array) -> Array:
+    """Return multipliers (L, m) and the forces that they give, shape (L, m + K)."""
+    code = own.request(FORCES, False)
+    assert code is not None
+    p = np.broadcast_to(points.p.T, (len(factors), len(points.p)))
+    both = np.concatenate((p, factors), axis=-1)
+    return np.concatenate((factors, points.observe(code, both.T)[0].T), axis=-1)

@@ -12,7 +12,7 @@ that may not be trusted, the right sides come from the mechanism with its sensit
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -30,11 +30,9 @@ from kincompile.names import (
 )
 from kincompile.runtime.engine.code import SENSITIVE, SENSITIVITIES, code_of
 from kincompile.runtime.engine.dense import powers_of_rows
-from kincompile.runtime.engine.planned import trusted
 from kincompile.runtime.inputs import names_of
-from kincompile.runtime.memory import empty
 from kincompile.runtime.results.columns import largest, rate_unit
-from kincompile.runtime.results.observed import observed
+from kincompile.runtime.results.observed import Points, observed
 from kincompile.runtime.results.solution import require_solution
 from kincompile.tables import indented, table
 
@@ -50,9 +48,6 @@ if TYPE_CHECKING:
 
 WITNESSES = 5
 """Points at which redundant equations are looked at; most of them stand nowhere special."""
-
-BLOCK = 500
-"""Points whose matrices are taken at a time, so that they fit into memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -232,7 +227,7 @@ def sensitivities(
     columns = (*code.coordinates, *code.outputs)
     if of is not None:
         columns = _columns(names_of(of, "of"), columns, solution.name)
-    found = _over_motion(solution, code, names, columns, second)
+    found = _Asked(code, names, columns, second).over(solution)
     found, pairs = found[:, : len(names)], found[:, len(names) :]
     size = len(set(columns) & set(code.coordinates))
     parts = found[:, :, :size], found[:, :, size:]
@@ -274,55 +269,6 @@ def _columns(of: Sequence[str], known: Sequence[str], mechanism: str) -> tuple[s
     return tuple(name for name in known if name in wanted)
 
 
-def _over_motion(
-    solution: Solution,
-    code: Compiled,
-    names: tuple[str, ...],
-    columns: tuple[str, ...],
-    second: bool,
-) -> Array:
-    """Return derivatives of columns and their rates, shape (3, k, columns, ..., N).
-
-    Those by pairs of parameters come after those by one.
-    """
-    shape, n = solution.q.shape[:-1], len(code.coordinates)
-    motion = [part.reshape(-1, n).T for part in (solution.q, solution.q_dot, solution.q_ddot)]
-    times = np.broadcast_to(solution.t, shape).ravel()
-    p = np.array(list(solution.parameters.values()), dtype=np.float64)
-    sets = p if p.ndim == 1 else np.repeat(p, shape[-1], axis=1)
-    points = _Points(code, names, columns, second, sets, times, *motion)
-    finite = np.isfinite(motion[1].sum(axis=0))
-    if code.redundant and finite.any():
-        some = np.flatnonzero(finite)
-        _require_agreement(points.at(some[:: max(1, some.size // WITNESSES)]), solution.name)
-    with np.errstate(all="ignore"):
-        found, is_trusted = points.by_plan()
-        left = np.flatnonzero(finite & ~is_trusted)
-        for start in range(0, left.size, BLOCK):
-            some = left[start : start + BLOCK]
-            found[:, : len(names), :, some] = points.at(some).by_matrices()
-            found[:, len(names) :, :, some] = np.nan
-    if not finite.all():
-        found[..., ~finite] = np.nan
-    if not (accelerated := np.isfinite(motion[2].sum(axis=0))).all():  # a corner of a driver
-        own = sum(name in code.coordinates for name in columns)
-        found[2, :, :own, ~accelerated] = np.nan
-    return found.reshape(*found.shape[:3], *shape)
-
-
-def _require_agreement(points: _Points, mechanism: str) -> None:
-    """Refuse parameters that would take apart a mechanism with redundant equations."""
-    matrices, sides = points.slopes()
-    moved = np.linalg.pinv(matrices)[:, np.newaxis] @ sides[..., np.newaxis]
-    is_met = _are_met(matrices[:, np.newaxis], moved[..., 0], sides, AGREEMENT).mean(axis=0) > 1 / 2
-    if wrong := [name for name, met in zip(points.names, is_met, strict=True) if not met]:
-        raise InputError(
-            f"{mechanism} has redundant equations, {listed(points.code.redundant)}, which would no "
-            f"longer agree with the others if {listed(wrong)} changed alone: it could not be "
-            "assembled. Make one parameter of all dimensions that have to change together."
-        )
-
-
 def _are_met(matrix: Array, rates: Array, sides: Array, part: float) -> NDArray[np.bool_]:
     """Say at which of (..., n) rates all equations are met, up to a part of the largest terms."""
     rates = rates[..., np.newaxis]
@@ -332,52 +278,74 @@ def _are_met(matrix: Array, rates: Array, sides: Array, part: float) -> NDArray[
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Points:
-    """A batch of points, and what is asked there: columns by parameters."""
+class _Asked:
+    """What is asked for: the derivatives of columns by parameters."""
 
     code: Compiled
     names: tuple[str, ...]
     columns: tuple[str, ...]
     second: bool
-    p: Array
-    t: Array
-    q: Array
-    q_dot: Array
-    q_ddot: Array
 
-    def at(self, some: NDArray[np.intp]) -> _Points:
-        """Return some of the points."""
-        p = self.p if self.p.ndim == 1 else self.p[:, some]
-        states = {name: getattr(self, name)[:, some] for name in ("q", "q_dot", "q_ddot")}
-        return replace(self, p=p, t=self.t[some], **states)
+    def over(self, solution: Solution) -> Array:
+        """Return derivatives of columns and their rates, shape (3, k, columns, ..., N).
 
-    def by_plan(self) -> tuple[Array, NDArray[np.bool_]]:
+        Those by pairs of parameters come after those by one.
+        """
+        points, k = Points.of(solution), len(self.names)
+        finite = np.isfinite(points.q_dot.sum(axis=0))
+        if self.code.redundant and finite.any():
+            some = np.flatnonzero(finite)
+            self._require_agreement(points.at(some[:: max(1, some.size // WITNESSES)]))
+        with np.errstate(all="ignore"):
+            found, is_trusted = self._by_plan(points)
+            for own, some_points in points.parts(finite & ~is_trusted):
+                found[:, :k, :, own] = self._by_matrices(some_points)
+                found[:, k:, :, own] = np.nan
+        if not finite.all():
+            found[..., ~finite] = np.nan
+        accelerated = np.isfinite(points.q_ddot.sum(axis=0))
+        if not accelerated.all():  # a corner of a driver
+            size = sum(name in self.code.coordinates for name in self.columns)
+            found[2, :, :size, ~accelerated] = np.nan
+        return found.reshape(*found.shape[:3], *solution.q.shape[:-1])
+
+    def _require_agreement(self, points: Points) -> None:
+        """Refuse parameters that would take apart a mechanism with redundant equations."""
+        matrices, sides = self._slopes(points)
+        moved = np.linalg.pinv(matrices)[:, np.newaxis] @ sides[..., np.newaxis]
+        are_met = _are_met(matrices[:, np.newaxis], moved[..., 0], sides, AGREEMENT)
+        agree = (are_met.mean(axis=0) > 1 / 2).tolist()
+        if wrong := [name for name, good in zip(self.names, agree, strict=True) if not good]:
+            raise InputError(
+                f"{self.code.name} has redundant equations, {listed(self.code.redundant)}, which "
+                f"would no longer agree with the others if {listed(wrong)} changed alone: it could "
+                "not be assembled. Make one parameter of all dimensions that have to change "
+                "together."
+            )
+
+    def _by_plan(self, points: Points) -> tuple[Array, NDArray[np.bool_]]:
         """Return the derivatives by the planned elimination, and where that can be trusted."""
         code = self.code.request(SENSITIVITIES, self.names, self.columns, self.second)
-        k = len(self.names)
+        k, count = len(self.names), points.t.size
         size = k + self.second * k * (k + 1) // 2, len(self.columns)
         if code is None:
-            return np.empty((3, *size, self.t.size)), np.zeros(self.t.size, dtype=bool)
-        seen = empty((3, len(code.outputs), self.t.size))
-        assert code.observe_into is not None
-        code.observe_into((self.q, self.q_dot, self.q_ddot), self.t, self.p, seen)
-        blocks = len(code.outputs) - math.prod(size)
-        found: Array = seen[:, blocks:].reshape(3, *size, -1)
-        return found, trusted(seen[0, 0], seen[0, 1:blocks])
+            return np.empty((3, *size, count)), np.zeros(count, dtype=bool)
+        found, is_trusted = points.solved(code, math.prod(size), 3)
+        return found.reshape(3, *size, count), is_trusted
 
-    def slopes(self) -> tuple[Array, Array]:
+    def _slopes(self, points: Points) -> tuple[Array, Array]:
         """Return Phi_q, (L, m, n), and -Phi_a of each parameter, (L, k, m)."""
-        m, k, q = len(self.code.equations), len(self.names), self.q.T
+        m, k, q, t, p = len(self.code.equations), len(self.names), points.q.T, points.t, points.p.T
         held = np.concatenate((q, np.zeros((len(q), k * q.shape[1]))), axis=1)
-        sides = -self.code.request(SENSITIVE, self.names).position(held, self.t, self.p.T)[0][:, m:]
-        return self.code.Phi_q(q, self.t, self.p.T), sides.reshape(-1, k, m)
+        sides = -self.code.request(SENSITIVE, self.names).position(held, t, p)[0][:, m:]
+        return self.code.Phi_q(q, t, p), sides.reshape(-1, k, m)
 
-    def by_matrices(self) -> Array:
+    def _by_matrices(self, points: Points) -> Array:
         """Return the derivatives by singular values; of redundant equations by least squares."""
         larger = self.code.request(SENSITIVE, self.names)
         m, n, k = len(self.code.equations), len(self.code.coordinates), len(self.names)
-        q, q_dot, q_ddot, t, p = self.q.T, self.q_dot.T, self.q_ddot.T, self.t, self.p.T
-        matrices, first = self.slopes()
+        q, q_dot, q_ddot, p = points.q.T, points.q_dot.T, points.q_ddot.T, points.p.T
+        t, (matrices, first) = points.t, self._slopes(points)
         powers = powers_of_rows(matrices)[:, np.newaxis]
         even, part = powers.swapaxes(1, 2) * matrices, AGREEMENT if self.code.redundant else SOLVED
         inverses = np.linalg.pinv(even)

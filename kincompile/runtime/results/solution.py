@@ -104,10 +104,7 @@ class Solution(MotionTable):
         return self._observed["joints"]
 
     def _over_motion(self, code: Compiled) -> Observed:
-        p = np.array(list(self.parameters.values()), dtype=np.float64).T
-        if self.q.ndim > 2 and not p.size:
-            p = np.zeros((len(self.q), 0))
-        return observed(code, (self.q, self.q_dot, self.q_ddot), self.t, p)
+        return observed(code, (self.q, self.q_dot, self.q_ddot), self.t, self.p)
 
     def observing(self, outputs: Observed) -> Solution:
         """Return the same motion with other outputs."""
@@ -164,11 +161,9 @@ class Solution(MotionTable):
     def _at_points(self, function: Callable[..., NDArray[Any]]) -> NDArray[Any]:
         """Return a function of code, q, t and p for the motion, or for that of each variant."""
         code = code_of(self.require_module(".condition and .branch"))
-        p = np.array(list(self.parameters.values()), dtype=np.float64)
         if self.q.ndim == 2:
-            return function(code, self.q, self.t, p)
-        sets = p.T if p.size else np.zeros((len(self.q), 0))
-        variants = zip(self.q, sets, strict=True)
+            return function(code, self.q, self.t, self.p)
+        variants = zip(self.q, self.p, strict=True)
         return np.array([function(code, q, self.t, one) for q, one in variants])
 
     def __getstate__(self) -> list[Any]:
@@ -199,8 +194,7 @@ class Solution(MotionTable):
         InputError
             If the solution is one of variants, holds no point that was found, or was pickled.
         """
-        p = np.array(list(self.parameters.values()), dtype=np.float64)
-        return measures(self, code_of(self.require_module("its measures")), p)
+        return measures(self, code_of(self.require_module("its measures")), self.p)
 
     def plot(
         self,

@@ -95,7 +95,7 @@ def _npz(solution: Solution, angle_unit: str) -> bytes:
     arrays = _arrays(solution, angle_unit)
     arrays |= {name: np.array(getattr(solution, name)) for name in ("success", "message", "name")}
     arrays |= {name: np.array(names, dtype=np.str_) for name, names in text.items()}
-    arrays["parameter_values"] = np.array(list(solution.parameters.values()), dtype=np.float64)
+    arrays["parameter_values"] = solution.p.T
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
     return buffer.getvalue()
