@@ -8,7 +8,7 @@ from itertools import islice
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
 RESERVED = frozenset({"t", "pi", "alpha", "deg"})
 """Names with a meaning of their own in every expression."""
@@ -144,6 +144,11 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     """
     close = get_close_matches(str(name)[:40], list(islice(known, 1000)), n=1)
     return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def unknown(text: str, name: str, known: Collection[str], remedy: str = "") -> str:
+    """Return a message about an unknown name: a text, which known one is close, and what to do."""
+    return f"{text}{suggestion(name, known) or '.'} There are {listed(known)}{remedy}."
 
 
 def sensitivity(name: str, parameter: str) -> str:

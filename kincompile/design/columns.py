@@ -9,7 +9,7 @@ import numpy as np
 
 from kincompile.criteria import probe_of
 from kincompile.errors import InputError
-from kincompile.names import column_name, listed, rate_of, suggestion
+from kincompile.names import column_name, rate_of, unknown
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import rate_unit
 
@@ -39,11 +39,8 @@ def column_of(code: Compiled, name: str) -> Column:
     if found := rate_of(wanted, known):
         _require_rate(code, *found)
         return Column(wanted, rate_unit(code.units.get(found[0], ""), found[1]), *found)
-    near = suggestion(wanted, known) or "."
-    raise InputError(
-        f"{code.name} has no coordinate, point or output {name!r}{near} There are "
-        f"{listed(known)}; add _dot or _ddot for the rates."
-    )
+    text = f"{code.name} has no coordinate, point or output {name!r}"
+    raise InputError(unknown(text, wanted, known, "; add _dot or _ddot for the rates"))
 
 
 def _require_rate(code: Compiled, of: str, order: int) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from kincompile.errors import InputError, package_of_extra
 from kincompile.html import Shown, table_html
-from kincompile.names import column_name, listed, suggestion
+from kincompile.names import column_name, listed, unknown
 from kincompile.runtime.results.columns import titled
 from kincompile.runtime.results.html import figure_html
 from kincompile.tables import counted, indented, table
@@ -137,11 +137,8 @@ class ToleranceAnalysis(Shown):
         wanted = column_name(str(name))
         if wanted in self.columns:
             return self.columns.index(wanted)
-        near = suggestion(wanted, self.columns) or "."
-        raise InputError(
-            f"the tolerances of {self.name} have no column {name!r}{near} There are "
-            f"{listed(self.columns)}; ask kc.tolerance for others."
-        )
+        text = f"the tolerances of {self.name} have no column {name!r}"
+        raise InputError(unknown(text, wanted, self.columns, "; ask kc.tolerance for others"))
 
     def headline(self) -> str:
         """Return the name and the sources."""

@@ -8,11 +8,10 @@ import numpy as np
 
 from kincompile.criteria import IN_RANGE, ROOT_LENGTH, SINGULAR_SENSITIVITY
 from kincompile.errors import InputError
-from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.inputs import mapping_of
 from kincompile.runtime.roots import root
 from kincompile.runtime.singular import events as singular
-from kincompile.runtime.singular.events import LOCK_UP, Event, involved
+from kincompile.runtime.singular.events import LOCK_UP, Event, event_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -47,20 +46,6 @@ PARTS = 8
 """Parts of a step at whose ends a value is looked at: what it passes twice within one is missed."""
 
 
-class Rank:
-    """Phi_q of a state, scaled, shape (m, n), as far as its singular values are small.
-
-    They are at most `part` of the largest; of each, a row of `movements` is what it hardly hinders,
-    and a column of `demands` the equations that say how fast.
-    """
-
-    def __init__(self, matrix: Array, part: float) -> None:
-        left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
-        lost = sizes <= part * sizes[:1]
-        self.is_lost = bool(lost.any())
-        self.movements, self.demands = right[lost], left[:, lost]
-
-
 def _asked(kind: str, values: Mapping[str, Any]) -> Iterator[tuple[str, str, float]]:
     """Yield kind, name and value of what is to be located; of a name there may be several."""
     for name, given in values.items():
@@ -89,30 +74,20 @@ class Watch:
         given = [*_asked(PASSAGE, mapping_of(events, "events")),
                  *_asked(STOP, mapping_of(stops, "stops"))]  # fmt: skip
         self._kinds = [kind for kind, _, _ in given]
-        self._names = self._checked([name for _, name, _ in given])
+        names, text = [name for _, name, _ in given], "an event is asked for at a value of"
+        self._columns = inputs.code.columns(names, text)
         self._values = np.array([value for _, _, value in given])
         self._signs = np.zeros(len(given))
 
-    def _checked(self, names: list[str]) -> list[str]:
-        known = (*self._inputs.code.coordinates, *self._inputs.code.outputs)
-        found = [column_name(name) for name in names]
-        if missing := [name for name in found if name not in known]:
-            near = suggestion(missing[0], known) or "."
-            raise InputError(
-                f"an event is asked for at a value of {missing[0]!r}{near} There are "
-                f"{listed(known)}; m.output(...) makes any expression an output."
-            )
-        return found
-
     def begin(self, t: float, y: Array) -> None:
         """Look at the first state."""
-        if self._names:
+        if self._columns:
             self._signs = np.sign(self._away(t, y))
 
     def events(self, t0: float, t1: float, state: States, singular: Event | None) -> list[Event]:
         """Return what happens in a step, in order, and remember its end."""
         found: list[Event] = [] if singular is None else [singular]
-        if self._names:
+        if self._columns:
             for part in range(1, PARTS + 1):
                 first, last = (t0 + (t1 - t0) * x / PARTS for x in (part - 1, part))
                 last = t1 if part == PARTS else last
@@ -131,8 +106,10 @@ class Watch:
         point = self._equations.point(q, t)
         if point is None or not self._equations.holds(point):
             return None
-        found = self._rank_at(point, 1 / SINGULAR_SENSITIVITY)
-        return self._event_at(SINGULAR, t, q, found) if found.is_lost else None
+        movements, _ = self._lost(point, 1 / SINGULAR_SENSITIVITY)
+        if not movements.size:
+            return None
+        return event_of(self._inputs.code, SINGULAR, SENTENCES, t, q.copy(), movements)
 
     def end_at(self, t: float, q: Array) -> Event | None:
         """Return the event of a position at which the motion ended near a singular configuration.
@@ -142,40 +119,38 @@ class Watch:
         point = self._equations.point(q, t)
         if point is None:
             return None
-        found = self._rank_at(point, NEAR)
-        if not found.is_lost:
+        movements, demands = self._lost(point, NEAR)
+        if not movements.size:
             return None
         demanded = self._equations.demanded(q, t)
-        size = float(np.linalg.norm(found.demands.T @ demanded))
+        size = float(np.linalg.norm(demands.T @ demanded))
         is_driven = size > IN_RANGE * float(np.linalg.norm(demanded))
-        return self._event_at(LOCK_UP if is_driven else SINGULAR, t, q, found)
+        kind = LOCK_UP if is_driven else SINGULAR
+        return event_of(self._inputs.code, kind, SENTENCES, t, q.copy(), movements)
 
     def _away(self, t: float, y: Array) -> Array:
         """Return how far the columns are above the values that are looked for."""
         n, code = self._equations.n, self._inputs.code
         q, q_dot = y[:n], y[n : 2 * n]
-        known = dict(zip(code.coordinates, q.tolist(), strict=True))
-        if code.outputs:
-            values = code.observe(q, q_dot, np.zeros(n), t, self._inputs.p)[0]
-            known |= zip(code.outputs, np.asarray(values).tolist(), strict=True)
-        return np.asarray([known[name] for name in self._names] - self._values)
+        values = code.observe(q, q_dot, np.zeros(n), t, self._inputs.p)[0] if code.outputs else ()
+        return np.asarray(np.concatenate((q, values))[self._columns] - self._values)
 
     def _located(self, k: int, t0: float, t1: float, state: States) -> Event:
         width = ROOT_LENGTH * max(abs(t1 - t0), abs(t0), abs(t1))
         t = root(lambda time: float(self._away(time, state(time))[k]), t0, t1, width)
         q = state(t)[: self._equations.n]
-        name = self._names[k]
+        code = self._inputs.code
+        name = (*code.coordinates, *code.outputs)[self._columns[k]]
         text = SENTENCES[self._kinds[k]].format(name=name, value=self._values[k], t=f"{t:.10g}")
-        owner = self._inputs.code.owners().get(name)
+        owner = code.owners().get(name)
         return Event(self._kinds[k], t, () if owner is None else (owner,), text, q, {})
 
-    def _rank_at(self, point: Point, part: float) -> Rank:
-        return Rank(self._equations.scaled(point), part)
+    def _lost(self, point: Point, part: float) -> tuple[Array, Array]:
+        """Return movements (k, n) that Phi_q hardly hinders, and demands (m, k) of how fast.
 
-    def _event_at(self, kind: str, t: float, q: Array, found: Rank) -> Event:
-        code, movement = self._inputs.code, found.movements[-1]
-        share = movement / np.abs(movement).max()
-        bodies = involved(code, np.linalg.norm(found.movements, axis=0))
-        text = SENTENCES[kind].format(t=f"{t:.10g}", bodies=listed(bodies))
-        shares = dict(zip(code.coordinates, share.tolist(), strict=True))
-        return Event(kind, t, bodies, text, q.copy(), shares)
+        They belong to its singular values of at most `part` of the largest.
+        """
+        matrix = self._equations.scaled(point)
+        left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
+        lost = sizes <= part * sizes[:1]
+        return right[lost], left[:, lost]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from kincompile.criteria import SPATIAL_COORDINATES, covers, may_turn, turning
 from kincompile.errors import InputError, StructuralError, UnsupportedError
-from kincompile.names import listed
+from kincompile.names import column_name, listed, unknown
 from kincompile.quantities import pattern_of
 from kincompile.runtime.contract import functions, present_in
 
@@ -159,6 +159,15 @@ class Compiled:
     def undriven(self) -> str:
         """Return which drivers are missing, where equations depend on others everywhere; or ""."""
         return self.request(UNDRIVEN) if UNDRIVEN in self.makers else ""
+
+    def columns(self, names: Iterable[str], text: str) -> list[int]:
+        """Return the numbers of columns among coordinates and outputs; the text refuses others."""
+        known = (*self.coordinates, *self.outputs)
+        wanted = [column_name(name) for name in names]
+        if missing := [name for name in wanted if name not in known]:
+            remedy = "; m.output(...) makes any expression an output, m.point(...) that of a body"
+            raise InputError(unknown(f"{text} {missing[0]!r}", missing[0], known, remedy))
+        return [known.index(name) for name in wanted]
 
     def owners(self) -> dict[str, str]:
         """Return the body of each coordinate; one that belongs to none stands for itself."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from kincompile.errors import InputError
 from kincompile.html import Shown
-from kincompile.names import column_name, listed, suggestion
+from kincompile.names import column_name, unknown
 from kincompile.tables import indented, table
 
 if TYPE_CHECKING:
@@ -59,11 +59,8 @@ class ForceMeasures(Shown):
         known = {item.name: item for item in self.items}
         wanted = name if name in known else column_name(name)
         if wanted not in known:
-            near = suggestion(wanted, known) or "."
-            raise InputError(
-                f"{self.name} has no force {name!r} that is measured{near} There are "
-                f"{listed(known)}."
-            )
+            text = f"{self.name} has no force {name!r} that is measured"
+            raise InputError(unknown(text, wanted, known))
         return known[wanted]
 
     def to_text(self) -> str:

@@ -26,7 +26,7 @@ from kincompile.names import (
     parameters_problem,
     quotient_unit,
     rate_of,
-    suggestion,
+    unknown,
 )
 from kincompile.runtime.engine.code import SENSITIVE, SENSITIVITIES, code_of
 from kincompile.runtime.engine.dense import powers_of_rows
@@ -136,22 +136,16 @@ class Sensitivities(Shown):
         """Return the number of a parameter."""
         if name in self.parameters:
             return self.parameters.index(name)
-        near = suggestion(name, self.parameters) or "."
-        raise InputError(
-            f"{self.name} has no sensitivities to {name!r}{near} There are those to "
-            f"{listed(self.parameters)}; ask kc.sensitivities for others."
-        )
+        text = f"{self.name} has no sensitivities to {name!r}"
+        raise InputError(unknown(text, name, self.parameters, "; ask kc.sensitivities for others"))
 
     def _found(self, column: str) -> tuple[str, int]:
         """Return the coordinate or output, and the order of the rate, that a name means."""
         wanted, known = column_name(column), (*self.coordinates, *self.outputs)
         if found := rate_of(wanted, known):
             return found
-        near = suggestion(wanted, known) or "."
-        raise InputError(
-            f"{self.name} has no column {column!r}{near} There are {listed(known)}; add _dot or "
-            "_ddot for the rates."
-        )
+        text, remedy = f"{self.name} has no column {column!r}", "; add _dot or _ddot for the rates"
+        raise InputError(unknown(text, wanted, known, remedy))
 
     def to_text(self) -> str:
         """Return a table: by parameter, the largest absolute derivative of each column."""
@@ -261,11 +255,8 @@ def _columns(of: Sequence[str], known: Sequence[str], mechanism: str) -> tuple[s
     wanted = [column_name(name) for name in of]
     for given, name in zip(of, wanted, strict=True):
         if name not in known:
-            near = suggestion(name, known) or "."
-            raise InputError(
-                f"{mechanism} has no coordinate or output {given!r}{near} There are "
-                f"{listed(known)}; derivatives of rates come with them."
-            )
+            text = f"{mechanism} has no coordinate or output {given!r}"
+            raise InputError(unknown(text, name, known, "; derivatives of rates come with them"))
     return tuple(name for name in known if name in wanted)
 
 

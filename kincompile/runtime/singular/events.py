@@ -23,6 +23,8 @@ from kincompile.runtime.singular.curve import Bracket, Curve
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from kincompile.runtime.engine.code import Compiled
     from kincompile.runtime.engine.linear import Array as Vector
     from kincompile.runtime.engine.scales import Point
@@ -197,15 +199,19 @@ def branch_switch(code: Compiled, state: State, t: float, q: Vector, reference: 
 def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) -> Event:
     """Name what moves, and say what to do."""
     _, sizes, directions = np.linalg.svd(equations.scaled(Phi_q))
-    null = directions[-1] / directions[-1][np.argmax(np.abs(directions[-1]))]
-    code = equations.code
     # Equal loops become singular together: then several movements are free.
     free = directions[np.append(sizes[:-1] <= IN_RANGE * sizes[0], True)]
+    return event_of(equations.code, kind, SENTENCES, t, q, free)
+
+
+def event_of(
+    code: Compiled, kind: str, sentences: Mapping[str, str], t: float, q: Vector, free: Vector
+) -> Event:
+    """Return an event at which movements (k, n), in scales, are free; it shows the last one."""
     bodies = involved(code, np.linalg.norm(free, axis=0))
-    return Event(
-        kind, t, bodies, SENTENCES[kind].format(t=f"{t:.10g}", bodies=listed(bodies)), q,
-        dict(zip(code.coordinates, null.tolist(), strict=True)),
-    )  # fmt: skip
+    text = sentences[kind].format(t=f"{t:.10g}", bodies=listed(bodies))
+    shares = (free[-1] / free[-1][np.argmax(np.abs(free[-1]))]).tolist()
+    return Event(kind, t, bodies, text, q, dict(zip(code.coordinates, shares, strict=True)))
 
 
 def involved(code: Compiled, movement: Vector) -> tuple[str, ...]:

@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import RANK, TINY, ZERO
-from kincompile.errors import InputError
-from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.corrector import nearest
 from kincompile.runtime.problem import problem
 from kincompile.runtime.status import Status
@@ -139,15 +137,9 @@ class Balance:
 
     def gradients(self, names: Sequence[str], q: Array, t: float) -> Array:
         """Return the derivatives of coordinates or outputs of these names, shape (k, n)."""
-        known, rows = (*self.code.coordinates, *self.code.outputs), np.eye(q.size)
+        rows = np.eye(q.size)
         if self.code.outputs:
             still = np.zeros_like(q)
             rows = np.vstack((rows, self.code.outputs_q(q, still, still, t, self._p)))
-        wanted = [column_name(name) for name in names]
-        if missing := [name for name in wanted if name not in known]:
-            near = suggestion(missing[0], known) or "."
-            raise InputError(
-                f"{self.code.name} has no coordinate and no output {missing[0]!r}{near} There are "
-                f"{listed(known)}; m.point(...) makes a point of a body an output."
-            )
-        return np.asarray(rows[[known.index(name) for name in wanted]])
+        text = f"{self.code.name} has no coordinate and no output"
+        return np.asarray(rows[self.code.columns(names, text)])

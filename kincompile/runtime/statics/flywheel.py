@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from kincompile.criteria import SLIGHT
 from kincompile.errors import InputError
 from kincompile.html import Shown
-from kincompile.names import listed, suggestion
+from kincompile.names import unknown
 from kincompile.runtime.results.forces import Forces
 
 if TYPE_CHECKING:
@@ -128,8 +128,7 @@ def _checked(found: Forces, driver: str, fluctuation: Any) -> tuple[Array, Array
     problems = []
     drivers = found.drivers
     if driver not in drivers:
-        near = suggestion(str(driver), drivers) or "."
-        problems.append(f"there is no driver {driver!r}{near} There are {listed(drivers)}.")
+        problems.append(unknown(f"there is no driver {driver!r}", str(driver), drivers))
     if not (isinstance(fluctuation, int | float | np.number) and 0 < fluctuation < 1):
         problems.append(f"the fluctuation is {fluctuation!r}: give a part of the speed, as 0.02.")
     if found.motion.t.size < FEWEST:

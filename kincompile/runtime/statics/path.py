@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import ZERO
-from kincompile.names import listed
 from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.march import State
 from kincompile.runtime.singular.curve import Curve
-from kincompile.runtime.singular.events import Event, involved
+from kincompile.runtime.singular.events import event_of
 from kincompile.runtime.statics.settle import settle
 
 if TYPE_CHECKING:
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
 
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.problem import Problem
+    from kincompile.runtime.singular.events import Event
     from kincompile.runtime.statics.balance import Balance, Place
     from kincompile.runtime.statics.settle import Rest
 
@@ -207,10 +207,7 @@ class Path:
         n, code = self.balance.scale.size, self.balance.code
         place, _ = located
         movement = np.linalg.svd(place.matrix[:, :-1])[2][-1][:n]
-        largest = movement[np.argmax(np.abs(movement))]
-        bodies = involved(code, movement)
         kind = LIMIT_POINT if bracket.turns else BIFURCATION
-        message = SENTENCES[kind].format(t=f"{place.t:.10g}", bodies=listed(bodies))
-        shares = dict(zip(code.coordinates, (movement / largest).tolist(), strict=True))
-        found = Event(kind, place.t, bodies, message, place.q[:n], shares)
+        free = movement[np.newaxis]
+        found = event_of(code, kind, SENTENCES, place.t, place.q[:n], free)
         return found, bracket.second.q[:n], bracket.second.t
