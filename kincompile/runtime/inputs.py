@@ -72,6 +72,12 @@ class Inputs:
     sweep: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     without_guess: tuple[str, ...] = ()  # bodies that have no guess
 
+    def one_time(self, text: str, remedy: str) -> float:
+        """Return the time; refuse several, with a text that says why and what to do."""
+        if self.t.size > 1:
+            raise InputError(f"{text}, got {self.t.size}: {remedy}.")
+        return float(self.t[0])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variants:

@@ -1,9 +1,8 @@
 """Outputs between the points of a motion, as measures ask for them: of one motion, or of many.
 
 What asks is a generator (`Between`): it yields a time at which outputs are not known yet, and goes
-on when they are. So the same code measures one motion, each time followed by the careful march
-(`alone`), and those of many parameter sets side by side, whose times are found in one batch
-(`together`).
+on when they are. So the same code measures one motion, each time followed by the careful march, and
+those of many parameter sets side by side, whose times are found in one batch.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ T = TypeVar("T")
 Between: TypeAlias = Generator[float, None, T]
 
 SHARP = 1e-2
-"""The same, where the rate is a difference: its jump over twice the distance `APART`."""
+"""Part of the largest rate from which on a jump of a rate over twice `APART` is a corner."""
 
 APART = 1e-5
 """Distance of the times that give a rate where none is emitted, as a part of the span."""
@@ -163,17 +162,6 @@ class ObservedMotion:
             unit = units.get(name, "")
             found[unit] = max(found.get(unit, 0.0), value)
         return found
-
-
-def alone(motion: ObservedMotion, asking: Between[T]) -> T:
-    """Return what comes out, of one motion."""
-    while True:
-        try:
-            t = next(asking)
-        except StopIteration as end:
-            found: T = end.value
-            return found
-        motion.look(t)
 
 
 def together(motions: Sequence[ObservedMotion], asking: Sequence[Between[T]]) -> list[T]:

@@ -17,7 +17,7 @@ from kincompile.runtime.engine.code import DRIVERS
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.singular.events import BIFURCATION, LOCK_UP, involved
-from kincompile.runtime.singular.reach import freed_curve
+from kincompile.runtime.singular.reach import Measure, freed_curve
 from kincompile.tables import table
 
 if TYPE_CHECKING:
@@ -33,26 +33,6 @@ ROUND = math.tau
 
 SIZES = 4.0
 """How far a length is driven, in sizes of the mechanism."""
-
-
-@dataclass(frozen=True, slots=True)
-class Driver:
-    """A driver at one time, as the compiler describes it."""
-
-    # name, unit: its name, and the unit of its value
-    name: str
-    unit: str
-    row: int  # its row in Phi
-    value: float  # C at that time
-    is_squared: bool  # whether the row is that of C^2, as of a distance
-
-    def moved(self, value: float) -> float:
-        """Return what its row of Phi has where the driver has another value; none below zero."""
-        return max(value, 0.0) ** 2 - self.value**2 if self.is_squared else value - self.value
-
-    def at(self, moved: float) -> float:
-        """Return the driver's value where its row of Phi has a value."""
-        return math.sqrt(max(self.value**2 + moved, 0.0)) if self.is_squared else self.value + moved
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,29 +93,29 @@ def driver_ranges(solution: MotionTable, code: Compiled, p: Array) -> tuple[Driv
         return ()
     with np.errstate(all="ignore"):
         equations = problem(code, p, q, t)
-        drivers = [Driver(*item) for item in code.request(DRIVERS)(t, p)]
-        return tuple(_range(equations, driver, q, t) for driver in drivers)
+        found = []
+        for name, unit, row, value, is_squared in code.request(DRIVERS)(t, p):
+            form = Measure(unit, value**2 if is_squared else value, is_squared)
+            low, high = (_limit(equations, form, row, q, t, sign) for sign in (-1.0, 1.0))
+            found.append(DriverRange(name, unit, value, low, high))
+        return tuple(found)
 
 
-def _range(equations: Problem, driver: Driver, q: Array, t: float) -> DriverRange:
-    low, high = (_limit(equations, driver, q, t, sign) for sign in (-1.0, 1.0))
-    return DriverRange(driver.name, driver.unit, driver.value, low, high)
-
-
-def _limit(equations: Problem, driver: Driver, q: Array, t: float, sign: float) -> Limit:
-    """Follow the driver one way, up to the first singular configuration."""
-    reach = ROUND if driver.unit == "rad" else SIZES * float(np.max(equations.reference))
+def _limit(equations: Problem, form: Measure, row: int, q: Array, t: float, sign: float) -> Limit:
+    """Follow the driver of a row one way, up to the first singular configuration."""
+    reach = ROUND if form.unit == "rad" else SIZES * float(np.max(equations.reference))
     point = equations.at(q, t)
     assert point is not None  # it was solved
-    curve, state = freed_curve(equations, driver.row, point, t)
+    curve, state = freed_curve(equations, row, point, t)
     start = curve.start(state, sign)
-    bracket = start and curve.next_singular(start, driver.moved(driver.value + sign * reach))
+    end = form.residual(form.value(0.0) + sign * reach)
+    bracket = start and curve.next_singular(start, end)
     found = bracket and curve.singular_point(bracket)
     if not (bracket and found):
         return Limit(sign * math.inf, "", (), np.empty(0))
     place = found[0]
     kind = LOCK_UP if bracket.turns else BIFURCATION
-    return Limit(driver.at(place.t), kind, involved(equations.code, place.tangent[:-1]), place.q)
+    return Limit(form.value(place.t), kind, involved(equations.code, place.tangent[:-1]), place.q)
 
 
 def driver_table(drivers: tuple[DriverRange, ...], angle_unit: str) -> list[str]:

@@ -15,7 +15,6 @@ import numpy as np
 
 from kincompile.criteria import HALF, RANK, TINY, probe_of
 from kincompile.errors import InputError, SingularConfigurationWarning
-from kincompile.html import Shown
 from kincompile.names import listed, multiplier
 from kincompile.runtime.engine.code import FORCES, JOINTS, code_of
 from kincompile.runtime.engine.dense import powers_of_rows
@@ -23,7 +22,7 @@ from kincompile.runtime.results.columns import largest
 from kincompile.runtime.results.force_measures import ForceMeasures, force_measures
 from kincompile.runtime.results.observed import Points
 from kincompile.runtime.results.orientation import orientation
-from kincompile.runtime.results.solution import Solution, require_solution
+from kincompile.runtime.results.solution import OfMotion, Solution, require_solution
 from kincompile.tables import indented, table
 
 if TYPE_CHECKING:
@@ -79,7 +78,7 @@ class Drive:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Forces(Shown):
+class Forces(OfMotion):
     """Forces over a motion of N points.
 
     ``found["A.F_x"]``, ``found["motor.drive"]`` and the like give columns by name, and so do those
@@ -103,21 +102,6 @@ class Forces(Shown):
     multipliers: Array
     undetermined: tuple[str, ...]
     _joints: dict[str, tuple[str, ...]]
-
-    @property
-    def name(self) -> str:
-        """Name of the mechanism."""
-        return self.motion.name
-
-    def __getitem__(self, name: str) -> Array:
-        """Return the values of a column, shape (N,).
-
-        Raises
-        ------
-        InputError
-            When there is no such column.
-        """
-        return self.motion[name]
 
     def _column(self, name: str) -> Array:
         """Return a force, zeros where it is not a column since it vanishes."""

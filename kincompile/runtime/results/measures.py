@@ -23,7 +23,7 @@ import numpy as np
 from kincompile.criteria import ROOT_LENGTH, SOLVED, STILL, ZERO
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
-from kincompile.runtime.results.between import ObservedMotion, alone, derivative, together
+from kincompile.runtime.results.between import ObservedMotion, derivative, together
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.driver_range import DriverRange, driver_ranges, driver_table
 from kincompile.runtime.results.plot import runs
@@ -145,12 +145,11 @@ def output_measures(
         raise InputError(f"{solution.name} has no motion to measure. {solution.message}")
     if all(name in solution.observed.without_rates for name in solution.observed.names):
         return ()
-    motion = ObservedMotion(solution, code, p)
-    return alone(motion, _all_measured(motion, names))
+    return measures_together([solution], code, p[np.newaxis], names)[0]
 
 
 def measures_together(
-    solutions: Sequence[MotionTable], code: Compiled, sets: Array, names: Container[str]
+    solutions: Sequence[MotionTable], code: Compiled, sets: Array, names: Container[str] | None
 ) -> list[tuple[OutputMeasures, ...]]:
     """Measure the outputs of these names over motions with parameters (B, k), as each alone."""
     pairs = zip(solutions, sets, strict=True)

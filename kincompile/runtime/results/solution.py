@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError
-from kincompile.html import picture_html
+from kincompile.html import Shown, picture_html
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.results.columns import MotionTable, Observed
 from kincompile.runtime.results.html import solution_html
@@ -253,6 +253,29 @@ class Solution(MotionTable):
             return f"converged, largest residual {np.max(self.residual):.1e}"
         good = np.count_nonzero(self.good)
         return f"failed, {good} of {self.status.size} points converged; see .message"
+
+
+class OfMotion(Shown):
+    """What is known over a motion: ``found["rod.phi"]`` and the like give its columns by name."""
+
+    __slots__ = ()
+
+    motion: Solution
+
+    @property
+    def name(self) -> str:
+        """Name of the mechanism."""
+        return self.motion.name
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """Return the values of a column, shape (N,).
+
+        Raises
+        ------
+        InputError
+            When there is no such column.
+        """
+        return self.motion[name]
 
 
 def require_solution(value: object) -> None:

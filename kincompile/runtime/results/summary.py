@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import NOISE
-from kincompile.runtime.results.columns import shown_unit
+from kincompile.runtime.results.columns import largest, shown_unit
 from kincompile.runtime.status import Status
 from kincompile.tables import counted, table
 
@@ -52,7 +52,7 @@ def _table(solution: Solution, angle_unit: str) -> list[str]:
     rows = []
     for name, q, q_dot, q_ddot in zip(solution.coordinates, *shown, strict=True):
         unit, factor = shown_unit(solution.units[name], angle_unit)
-        rates = _largest(factor * q_dot), _largest(factor * q_ddot)
+        rates = (_text(largest(factor * part)) for part in (q_dot, q_ddot))
         rows.append([name, unit, *_extremes(solution.t, factor * q), *rates])
     header = ("coordinate", "unit", "min", "at t", "max", "at t", *_NUMBERS[3:])
     return table(header, rows, right=_NUMBERS)
@@ -60,8 +60,7 @@ def _table(solution: Solution, angle_unit: str) -> list[str]:
 
 def without_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the values, with zero for those that are rounding errors of the largest."""
-    largest = np.max(np.abs(values), initial=0.0, where=np.isfinite(values))
-    return np.where(np.abs(values) < NOISE * largest, 0.0, values)
+    return np.where(np.abs(values) < NOISE * largest(values), 0.0, values)
 
 
 def _extremes(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[str, str, str, str]:
@@ -81,29 +80,18 @@ def _first(
     return _text(extreme), _text(t[there.argmax()])
 
 
-def _largest(values: NDArray[np.float64]) -> str:
-    """Return the largest absolute value."""
-    found = np.abs(values[np.isfinite(values)])
-    return _text(found.max()) if found.size else "-"
-
-
-def _text(number: np.float64) -> str:
-    return f"{number:.6g}"
+def _text(number: float) -> str:
+    return "-" if np.isnan(number) else f"{number:.6g}"
 
 
 def _verdict(solution: Solution) -> str:
     """Return the points by status, the iterations and the largest residual."""
     counts = [(np.count_nonzero(solution.status == status), status) for status in Status]
     by_status = ", ".join(f"{count} {status.name}" for count, status in counts if count)
+    residual = solution.residual[solution.good]  # of failures it is in `.message`
     kind = "step" if "steps" in solution.statistics else "Newton iteration"
     return (
         f"{counted(solution.t.size, 'point')} from t = {solution.t[0]:g} to {solution.t[-1]:g}: "
         f"{by_status}; {counted(int(solution.iterations.sum()), kind)}, "
-        f"largest residual {_largest_residual(solution)}"
+        f"largest residual {f'{residual.max():.1e}' if residual.size else '-'}"
     )
-
-
-def _largest_residual(solution: Solution) -> str:
-    """Return the largest residual of the converged points; failures are in `.message`."""
-    found = solution.residual[solution.good]
-    return f"{found.max():.1e}" if found.size else "-"

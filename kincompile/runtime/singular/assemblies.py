@@ -86,10 +86,7 @@ def assemblies(module: ModuleType, t: float = 0.0, p: Values = None) -> Vector:
     ends.
     """
     inputs = read_inputs(module, t, p, None, SMALL_CORRECTION, MAX_ITERATIONS)
-    if inputs.t.size > 1:
-        raise InputError(
-            f"assemblies are those of one time, got {inputs.t.size}: call it for each."
-        )
+    inputs.one_time("assemblies are those of one time", "call it for each")
     return assembled_positions(inputs)
 
 

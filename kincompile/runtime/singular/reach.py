@@ -61,6 +61,11 @@ class Measure:
         moved = residual + (self.offset or 0.0)
         return math.sqrt(max(moved, 0.0)) if self.is_square else moved
 
+    def residual(self, value: float) -> float:
+        """Return what the row of Phi has where the number has a value; none below zero."""
+        moved = max(value, 0.0) ** 2 if self.is_square else value
+        return moved - (self.offset or 0.0)
+
     def text(self, number: float) -> str:
         """Return a number with its unit."""
         return f"{number:.4g} {self.unit}".rstrip()

@@ -9,11 +9,10 @@ import numpy as np
 
 from kincompile.criteria import MAX_ITERATIONS, SLIGHT, TOLERANCE, ZERO
 from kincompile.errors import InputError, SolveError, StructuralError
-from kincompile.html import Shown
 from kincompile.names import listed
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.results.forces import forces, no_value
-from kincompile.runtime.results.solution import Solution
+from kincompile.runtime.results.solution import OfMotion, Solution
 from kincompile.runtime.singular.assemblies import is_new, spread_starts
 from kincompile.runtime.singular.events import involved
 from kincompile.runtime.statics.balance import Balance
@@ -47,7 +46,7 @@ FLUTTER, UNDECIDED = "flutter", "undecided"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Equilibrium(Shown):
+class Equilibrium(OfMotion):
     """Equilibria of a mechanism at N times, f degrees of freedom.
 
     ``found["rod.phi"]`` and the like give columns by name, shape (N,).
@@ -72,11 +71,6 @@ class Equilibrium(Shown):
     stability: tuple[str, ...]
     _rests: tuple[Rest, ...]
     _balance: Balance
-
-    @property
-    def name(self) -> str:
-        """Name of the mechanism."""
-        return self.motion.name
 
     @property
     def t(self) -> Array:
@@ -113,16 +107,6 @@ class Equilibrium(Shown):
             If the module was loaded from a file.
         """
         return forces(self.motion)
-
-    def __getitem__(self, name: str) -> Array:
-        """Return the values of a coordinate or output, shape (N,).
-
-        Raises
-        ------
-        InputError
-            When no column has this name.
-        """
-        return self.motion[name]
 
     def compliance(self, *names: str) -> Array:
         """Return how far coordinates or outputs move for unit forces along them.
@@ -301,11 +285,7 @@ def equilibria(module: ModuleType, t: float = 0.0, p: Values = None) -> list[Equ
         As `equilibrium`.
     """
     inputs = _inputs(module, t, p, None, None)
-    if inputs.t.size > 1:
-        raise InputError(
-            f"equilibria are those of one time, got {inputs.t.size}: call it for each."
-        )
-    time = float(inputs.t[0])
+    time = inputs.one_time("equilibria are those of one time", "call it for each")
     found: list[Rest] = []
     with np.errstate(all="ignore"):
         balance = Balance(inputs)
