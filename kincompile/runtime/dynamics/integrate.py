@@ -28,22 +28,18 @@ if TYPE_CHECKING:
     States = Callable[[float], Array]
     Between = Callable[[], States]
 
-WORDS = {
-    "done": "{name}: {points} points by {steps} steps of {method}. The energy is off by at most "
-    "{energy:.2g} of {level:.3g}, the constraints by {residual:.2g}; what led back to them moved "
-    "nothing by more than {drift:.2g}.",
-    "passed": " Passed: {kind} at t = {t:.10g}.",
-    "stopped": "{name} stopped at t = {t:.10g}: {why} The points before are good.",
-    "start": "{name} cannot begin at t = {t:.10g}: {why}",
-    "step": "{problem}. A load that jumps or grows without bounds does that, or a mechanism near a "
-    "singular configuration; where it is stiff, method='Radau' or 'BDF' takes longer steps.",
-    "many": "{most:,} steps were not enough to the next time. Where the mechanism is stiff, "
-    "method='Radau' or 'BDF' takes longer steps; else ask for more times, or a larger rtol.",
-    "drift": "its constraints cannot be held there.",
-    "nothing": "a load or an equation has no finite value.",
-}
-"""What is said of a simulation."""
+DRIFTS = "its constraints cannot be held there."
 
+FAILS = (
+    "A load that jumps or grows without bounds does that, or a mechanism near a singular "
+    "configuration; where it is stiff, method='Radau' or 'BDF' takes longer steps."
+)
+
+MANY = (
+    f"{MOST_STEPS:,} steps were not enough to the next time. Where the mechanism is stiff, "
+    "method='Radau' or 'BDF' takes longer steps; else ask for more times, or a larger rtol."
+)
+"""Why a simulation ends."""
 
 COLUMNS = (
     "q", "q_dot", "q_ddot", "kinetic", "work", "drift", "residual", "status", "steps"
@@ -135,7 +131,7 @@ class Integration:
     def never_began(self, why: str) -> None:
         """Note that there is no state to begin from."""
         self.status[0] = Status.NOT_CONVERGED
-        self.message = WORDS["start"].format(name=self._name, t=float(self.t[0]), why=why)
+        self.message = f"{self._name} cannot begin at t = {self.t[0]:.10g}: {why}"
 
     def run(self, y: Array, method: str, rtol: float, atol: float | None, max_step: float) -> None:
         """Follow the motion from its first state."""
@@ -144,7 +140,8 @@ class Integration:
         equations.turn_to_pivots()
         if not np.isfinite(equations.rate(t0, y)).all():
             event = self._watch.singular_at(t0, y[: equations.n])
-            self._fail(t0, event, WORDS["nothing"], Status.NOT_FINITE)
+            why = "a load or an equation has no finite value."
+            self._fail(t0, event, why, Status.NOT_FINITE)
             return
         allowed = (rtol if atol is None else atol) * equations.scale
         # The work follows from the motion: it does not decide how long steps are.
@@ -174,13 +171,13 @@ class Integration:
         coming = ahead(self._times, self._forward)
         step = self._across(before, y, coming) if self._is_near(y, coming, length) else None
         if step is None and self._movement(y, coming) <= LEFT:
-            self._stop(before, y, WORDS["drift"])
+            self._stop(before, y, DRIFTS)
             return None
         if step is None:
             solver.step(NEAR_PART * coming)
             if solver.problem or not np.isfinite(solver.y).all():
-                text = WORDS["step"].format(problem=solver.problem or "the rates are not finite")
-                self._stop(before, y, text)
+                problem = solver.problem or "the rates are not finite"
+                self._stop(before, y, f"{problem}. {FAILS}")
                 return None
             held, drift = self._equations.corrected(solver.t, solver.y)
             if self._equations.turn_to_pivots():
@@ -202,8 +199,7 @@ class Integration:
                 return None
         self._fill(step.end, step)
         if self._taken > MOST_STEPS:
-            text = WORDS["many"].format(most=MOST_STEPS)
-            self._fail(step.end, None, text, Status.NOT_CONVERGED)
+            self._fail(step.end, None, MANY, Status.NOT_CONVERGED)
             return None
         if step.passage is None or self._index == self.t.size:
             return solver
@@ -229,7 +225,7 @@ class Integration:
         half = abs(step.end - step.begin) / 2
         if half > SAME_TIME * max(abs(step.begin), abs(step.end)):
             return self._begun(step.begin, y, half)
-        self._stop(step.begin, y, WORDS["drift"])
+        self._stop(step.begin, y, DRIFTS)
         return None
 
     def _across(self, t: float, y: Array, coming: float) -> Step | None:
@@ -290,7 +286,7 @@ class Integration:
             self.events.append(event)
             why, status = event.message, Status.SINGULAR
         self.status[self._index] = status
-        self.message = WORDS["stopped"].format(name=self._name, t=t, why=why)
+        self.message = f"{self._name} stopped at t = {t:.10g}: {why} The points before are good."
 
     def _stop(self, t: float, y: Array, why: str) -> None:
         """Note why the motion ends at a state, near a singular configuration or elsewhere."""
@@ -316,16 +312,12 @@ class Integration:
     def _say_done(self) -> None:
         """Say how it went."""
         level = float(np.nanmax(np.abs(np.stack((self.kinetic, self.work)))))
-        self.message = WORDS["done"].format(
-            name=self._name,
-            points=self.t.size,
-            steps=self._total,
-            method=self._method,
-            energy=float(np.abs(self.energy_drift).max()),
-            level=level,
-            residual=float(self.residual.max()),
-            drift=float(self.drift.max()),
+        self.message = (
+            f"{self._name}: {self.t.size} points by {self._total} steps of {self._method}. The "
+            f"energy is off by at most {np.abs(self.energy_drift).max():.2g} of {level:.3g}, the "
+            f"constraints by {self.residual.max():.2g}; what led back to them moved nothing by "
+            f"more than {self.drift.max():.2g}."
         )
         for event in self.events:
-            passed = WORDS["passed"].format(kind=event.kind, t=event.t)
-            self.message += f" {event.message}" if event.kind == STOP else passed
+            passed = f"Passed: {event.kind} at t = {event.t:.10g}."
+            self.message += f" {event.message if event.kind == STOP else passed}"

@@ -8,7 +8,8 @@ states are led back where they are given out. Implicit methods get the derivativ
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Protocol
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,31 +32,26 @@ HISTORY = ("BDF", "CVODE")
 FAILED = "the step that its tolerances ask for has become too small for floating point"
 
 
-class Stepper(Protocol):
+class Stepper(ABC):
     """An integrator that goes from step to step."""
 
-    problem: str  # why it can go no further; "" as long as it can
+    problem = ""  # why it can go no further; "" as long as it can
+    # t, y: time and state after the last step
+    t: float
+    y: Array
+    length: float  # how long the next step is meant to be
 
-    @property
-    def t(self) -> float:
-        """Time after the last step."""
-
-    @property
-    def y(self) -> Array:
-        """State after the last step."""
-
-    @property
-    def length(self) -> float:
-        """How long the next step is meant to be."""
-
+    @abstractmethod
     def step(self, longest: float) -> None:
         """Take a step, no longer than this and not beyond the last time."""
 
-    def put(self, y: Array) -> None:
-        """Go on from another state, where that is possible."""
-
+    @abstractmethod
     def between(self) -> Callable[[float], Array]:
         """Return the states within the last step."""
+
+    def put(self, y: Array) -> None:
+        """Go on from another state, where there is no history."""
+        del y
 
 
 def stepper(
@@ -79,7 +75,7 @@ def stepper(
     return make(method, rates, t, y, tolerance, max_step, first)
 
 
-class _OneStep:
+class _OneStep(Stepper):
     """A solver of SciPy."""
 
     def __init__(
@@ -89,7 +85,6 @@ class _OneStep:
         from scipy import integrate
 
         rtol, atol = tolerance
-        self.problem = ""
         self._rate, jacobian = rates
         self._has_history, self._longest = method in HISTORY, max_step
         given = {} if method == "DOP853" else {"jac": jacobian}
@@ -98,18 +93,11 @@ class _OneStep:
             self._rate, t[0], y, t[1], rtol=rtol, atol=atol, max_step=max_step,
             first_step=first, **given,
         )  # fmt: skip
+        self._read()
 
-    @property
-    def t(self) -> float:
-        return float(self._solver.t)
-
-    @property
-    def y(self) -> Array:
-        return np.asarray(self._solver.y)
-
-    @property
-    def length(self) -> float:
-        return float(min(self._solver.h_abs, self._longest))
+    def _read(self) -> None:
+        self.t, self.y = float(self._solver.t), np.asarray(self._solver.y)
+        self.length = float(min(self._solver.h_abs, self._longest))
 
     def step(self, longest: float) -> None:
         self._solver.max_step = min(self._longest, longest)
@@ -119,13 +107,12 @@ class _OneStep:
             self.problem = FAILED
         if self._solver.status == "failed":
             self.problem = FAILED
+        self._read()
 
     def put(self, y: Array) -> None:
-        """Go on from another state, where there is no history."""
-        if self._has_history:
-            return
-        self._solver.y = y
-        self._solver.f = self._rate(self._solver.t, y)
+        if not self._has_history:
+            self.y = self._solver.y = y
+            self._solver.f = self._rate(self._solver.t, y)
 
     def between(self) -> Callable[[float], Array]:
         """Return SciPy's own interpolation."""
@@ -133,7 +120,7 @@ class _OneStep:
         return found
 
 
-class _Multistep:
+class _Multistep(Stepper):
     """CVODE of SUNDIALS, from scikit-sundae."""
 
     def __init__(
@@ -156,7 +143,7 @@ class _Multistep:
         rtol, atol = (part * STRICTER / np.sqrt(y.size) for part in tolerance)
         longest = max_step if np.isfinite(max_step) else 0.0
         finite = np.where(np.isfinite(atol), atol, LARGE)
-        self.problem, self.t, self.y, self._end = "", t[0], y, t[1]
+        self.t, self.y, self._end = t[0], y, t[1]
         self.length = first or 0.0
         self._solver = CVODE(
             into, rtol=float(rtol), atol=finite,
@@ -174,9 +161,6 @@ class _Multistep:
             return
         self.length = abs(float(found.t) - self.t)
         self.t, self.y = float(found.t), np.asarray(found.y)
-
-    def put(self, y: Array) -> None:
-        """Do nothing: the history stays."""
 
     def between(self) -> Callable[[float], Array]:
         """Return the interpolation of its history, which a request for a time behind it gives."""
