@@ -15,8 +15,7 @@ from kincompile.runtime.results.html import solution_html
 from kincompile.runtime.results.measures import measures
 from kincompile.runtime.results.observed import observed
 from kincompile.runtime.results.plot import plot_columns, plot_html
-from kincompile.runtime.singular.branches import counted_signatures, signatures
-from kincompile.runtime.singular.condition import conditions
+from kincompile.runtime.singular.condition import conditions, counted_signatures, signatures
 from kincompile.runtime.singular.events import BIFURCATION
 
 if TYPE_CHECKING:
