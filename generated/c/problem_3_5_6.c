@@ -1203,6 +1203,7 @@ typedef struct {
     int status;
     int iterations;
     int is_thrown;    // whether it went so far that rounding errors decide where it ends
+    int is_crawling;  // whether its corrections shrink no faster than towards a double root
     double q[N];      // the last position
     double first[N];  // the position after the first correction
     double away;      // from the guess, in millionths of what is near, up to there
@@ -1304,7 +1305,7 @@ static int holds(strip *b, start *s)
 }
 
 // Return whether every equation holds as well as floating point permits.
-static int holds_to_rounding(strip *b, start *s)
+static int vanish(strip *b, start *s)
 {
     double scale[N];
     for (int i = 0; i < N; i++) {
@@ -1441,9 +1442,9 @@ static int safeguarded_step(const double *q, strip *b, start *s)
 static void iterate(const double *guess, int is_safe, int most, strip *b, start *s, attempt *a)
 {
     double size = 0.0;
-    int is_crawling = 0;
     a->iterations = 0;
     a->is_thrown = 0;
+    a->is_crawling = 0;
     memcpy(a->q, guess, sizeof a->q);
     memcpy(a->first, guess, sizeof a->first);
     a->status = place_at(guess, s->t, b) ? PROBLEM_3_5_6_NOT_CONVERGED
@@ -1470,19 +1471,19 @@ static void iterate(const double *guess, int is_safe, int most, strip *b, start 
             }
             size = sqrt(size);
             a->iterations++;
-            is_crawling = a->iterations > 1 && size > last / 4.0;
+            a->is_crawling = a->iterations > 1 && size > last / 4.0;
             if (a->iterations == 1)
                 memcpy(a->first, a->q, sizeof a->first);
             int has_ended = is_small && holds(b, s);
-            if (!has_ended && (is_small || is_crawling))
-                has_ended = holds_to_rounding(b, s);
+            if (!has_ended && (is_small || a->is_crawling))
+                has_ended = vanish(b, s);
             if (has_ended) {
                 a->status = PROBLEM_3_5_6_CONVERGED;
                 is_going = 0;
             }
         }
     }
-    if (is_going && is_crawling && holds(b, s))
+    if (is_going && a->is_crawling && holds(b, s))
         a->status = PROBLEM_3_5_6_SINGULAR;
 }
 
@@ -1671,6 +1672,7 @@ static void take(strip *b, start *s, attempt *a, attempt *other, attempt *best)
     if (is_better) {
         best->status = a->status;
         best->iterations = a->iterations;
+        best->is_crawling = a->is_crawling;
         memcpy(best->q, a->q, sizeof best->q);
         best->away = a->away;
         best->rank = a->rank;
@@ -1784,40 +1786,46 @@ static int is_settled(const start *s, const attempt *a)
 
 // Make safeguarded attempts until one converges: from the guess, then further and further away.
 // With all bodies on a line no equation tells which way to bend. Where a position was found
-// already, one is enough.
-static void rescue(int is_sound, int most, strip *b, start *s, attempt *a)
+// already, one is enough; else the best one ends as the attempt that misses the equations least.
+static void rescue(int is_sound, int most, strip *b, start *s, attempt *a, attempt *best)
 {
     double begin[N];
     double reach = 0.0;
+    double least = INFINITY;
     for (int k = 0; k < (is_sound ? 1 : RESTARTS + 1); k++) {
         for (int i = 0; i < N; i++) {
-            const int place = i + 1 >= k ? i + 1 - k : M + i + 1 - k;
             begin[i] = s->meant[i];
-            if (k > 0)
+            if (k > 0) {
+                int place = i + 1 + RESTARTS * M - k;
+                while (place >= M)
+                    place -= M;
                 begin[i] += reach * s->reference[i] * PROBE[place];
+            }
         }
         iterate(begin, 1, most, b, s, a);
         if (a->status == PROBLEM_3_5_6_CONVERGED)
             break;
+        const double missed_now = place_at(a->q, s->t, b) ? residual(s->magnitude, b)
+            : INFINITY;
+        if (!is_sound && (k == 0 || missed_now < least)) {
+            least = missed_now;
+            best->status = a->status;
+            best->iterations = a->iterations;
+        }
         reach += NUDGE;
     }
 }
 
-// Find a position from a guess, or why there is none.
-static void position_from(const double *guess, double size, int most, strip *b, start *s,
-    attempt *best)
+// Find a position from a guess, or why there is none, judged by what was found around one.
+static void find_position(const double *guess, int most, strip *b, start *s, attempt *best)
 {
     attempt plain;
     attempt a;
     attempt other;
     memcpy(s->meant, guess, sizeof s->meant);
-    orient(s);
-    double near[N];
-    memcpy(near, s->meant, sizeof near);
-    judge_around(near, size, b, s);
     best->status = PROBLEM_3_5_6_NOT_FINITE;
-    memcpy(best->q, near, sizeof best->q);
-    if (place_at(near, s->t, b)) {
+    memcpy(best->q, guess, sizeof best->q);
+    if (place_at(guess, s->t, b)) {
         best->status = PROBLEM_3_5_6_NOT_CONVERGED;
         iterate(s->meant, 0, most, b, s, &plain);
         while (!is_settled(s, &plain) && turn(plain.first, b, s))
@@ -1830,13 +1838,11 @@ static void position_from(const double *guess, double size, int most, strip *b, 
         if (is_sound && !is_near)
             is_astray = best->rank > 0 || away_from(best->q, s->meant, s) > ASTRAY;
         if (is_astray) {
-            rescue(is_sound, most, b, s, &a);
+            rescue(is_sound, most, b, s, &a, best);
             if (a.status == PROBLEM_3_5_6_CONVERGED) {
                 take(b, s, &a, &other, best);
             } else if (plain.status == PROBLEM_3_5_6_CONVERGED && !is_sound) {
                 take(b, s, &plain, &other, best);
-            } else if (!is_sound) {
-                best->status = a.status;
             }
         }
         if (!is_near && best->status == PROBLEM_3_5_6_CONVERGED && other_side(best->q, b, s)) {
@@ -1853,8 +1859,20 @@ static void position_from(const double *guess, double size, int most, strip *b, 
             }
         }
         if (best->status == PROBLEM_3_5_6_CONVERGED)
-            unwind(near, b, s, best, &other);
+            unwind(guess, b, s, best, &other);
     }
+}
+
+// Find a position from a guess, or why there is none, for a size of the mechanism.
+static void position_from(const double *guess, double size, int most, strip *b, start *s,
+    attempt *best)
+{
+    memcpy(s->meant, guess, sizeof s->meant);
+    orient(s);
+    double near[N];
+    memcpy(near, s->meant, sizeof near);
+    judge_around(near, size, b, s);
+    find_position(near, most, b, s, best);
 }
 
 int problem_3_5_6_assemble(const problem_3_5_6_rough_guess *guess, double *q)

@@ -503,6 +503,8 @@ struct Attempt {
     iterations: usize,
     // whether it went so far that rounding errors decide where it ends
     is_thrown: bool,
+    // whether its corrections shrink no faster than towards a double root
+    is_crawling: bool,
     // the last position
     q: [f64; N_COORDINATES],
     // the position after the first correction
@@ -521,6 +523,7 @@ impl Attempt {
             status: 0,
             iterations: 0,
             is_thrown: false,
+            is_crawling: false,
             q: [0.0; N_COORDINATES],
             first: [0.0; N_COORDINATES],
             away: 0.0,
@@ -629,7 +632,7 @@ fn holds(b: &Point, s: &mut Start) -> bool {
 }
 
 /// Return whether every equation holds as well as floating point permits.
-fn holds_to_rounding(b: &Point, s: &mut Start) -> bool {
+fn vanish(b: &Point, s: &mut Start) -> bool {
     let mut scale = [0.0; N_COORDINATES];
     for i in 0..N_COORDINATES {
         let mut size = b.q[i].abs();
@@ -774,9 +777,9 @@ fn safeguarded_step(q: [f64; N_COORDINATES], b: &mut Point, s: &mut Start) -> us
 fn iterate(guess: [f64; N_COORDINATES], is_safe: bool, most: usize, b: &mut Point, s: &mut Start, a:
     &mut Attempt) {
     let mut size: f64 = 0.0;
-    let mut is_crawling = false;
     a.iterations = 0;
     a.is_thrown = false;
+    a.is_crawling = false;
     a.q = guess;
     a.first = guess;
     a.status = if place_at(guess, s.t, b) { NOT_CONVERGED } else { NOT_FINITE };
@@ -803,13 +806,13 @@ fn iterate(guess: [f64; N_COORDINATES], is_safe: bool, most: usize, b: &mut Poin
             }
             size = size.sqrt();
             a.iterations += 1;
-            is_crawling = a.iterations > 1 && size > last / 4.0;
+            a.is_crawling = a.iterations > 1 && size > last / 4.0;
             if a.iterations == 1 {
                 a.first = a.q;
             }
             let mut has_ended = is_small && holds(b, s);
-            if !has_ended && (is_small || is_crawling) {
-                has_ended = holds_to_rounding(b, s);
+            if !has_ended && (is_small || a.is_crawling) {
+                has_ended = vanish(b, s);
             }
             if has_ended {
                 a.status = CONVERGED;
@@ -817,7 +820,7 @@ fn iterate(guess: [f64; N_COORDINATES], is_safe: bool, most: usize, b: &mut Poin
             }
         }
     }
-    if is_going && is_crawling && holds(b, s) {
+    if is_going && a.is_crawling && holds(b, s) {
         a.status = SINGULAR;
     }
 }
@@ -1021,6 +1024,7 @@ fn take(b: &mut Point, s: &mut Start, a: &mut Attempt, other: &mut Attempt, best
     if is_better {
         best.status = a.status;
         best.iterations = a.iterations;
+        best.is_crawling = a.is_crawling;
         best.q = a.q;
         best.away = a.away;
         best.rank = a.rank;
@@ -1141,15 +1145,20 @@ fn is_settled(s: &Start, a: &Attempt) -> bool {
 
 /// Make safeguarded attempts until one converges: from the guess, then further and further away.
 /// With all bodies on a line no equation tells which way to bend. Where a position was found
-/// already, one is enough.
-fn rescue(is_sound: bool, most: usize, b: &mut Point, s: &mut Start, a: &mut Attempt) {
+/// already, one is enough; else the best one ends as the attempt that misses the equations least.
+fn rescue(is_sound: bool, most: usize, b: &mut Point, s: &mut Start, a: &mut Attempt, best: &mut
+    Attempt) {
     let mut begin = [0.0; N_COORDINATES];
     let mut reach: f64 = 0.0;
+    let mut least: f64 = INFINITE;
     for k in 0..if is_sound { 1 } else { RESTARTS + 1 } {
         for i in 0..N_COORDINATES {
-            let place = if i + 1 >= k { i + 1 - k } else { N_EQUATIONS + i + 1 - k };
             begin[i] = s.meant[i];
             if k > 0 {
+                let mut place = i + 1 + RESTARTS * N_EQUATIONS - k;
+                while place >= N_EQUATIONS {
+                    place -= N_EQUATIONS;
+                }
                 begin[i] += reach * s.reference[i] * PROBE[place];
             }
         }
@@ -1157,23 +1166,26 @@ fn rescue(is_sound: bool, most: usize, b: &mut Point, s: &mut Start, a: &mut Att
         if a.status == CONVERGED {
             break;
         }
+        let missed_now = if place_at(a.q, s.t, b) { residual(s.magnitude, b) } else { INFINITE };
+        if !is_sound && (k == 0 || missed_now < least) {
+            least = missed_now;
+            best.status = a.status;
+            best.iterations = a.iterations;
+        }
         reach += NUDGE;
     }
 }
 
-/// Find a position from a guess, or why there is none.
-fn position_from(guess: [f64; N_COORDINATES], size: f64, most: usize, b: &mut Point, s: &mut Start,
-    best: &mut Attempt) {
+/// Find a position from a guess, or why there is none, judged by what was found around one.
+fn find_position(guess: [f64; N_COORDINATES], most: usize, b: &mut Point, s: &mut Start, best: &mut
+    Attempt) {
     let mut plain = Attempt::new();
     let mut a = Attempt::new();
     let mut other = Attempt::new();
     s.meant = guess;
-    orient(s);
-    let mut near = s.meant;
-    judge_around(near, size, b, s);
     best.status = NOT_FINITE;
-    best.q = near;
-    if place_at(near, s.t, b) {
+    best.q = guess;
+    if place_at(guess, s.t, b) {
         best.status = NOT_CONVERGED;
         iterate(s.meant, false, most, b, s, &mut plain);
         while !is_settled(s, &plain) && turn(plain.first, b, s) {
@@ -1189,13 +1201,11 @@ fn position_from(guess: [f64; N_COORDINATES], size: f64, most: usize, b: &mut Po
             is_astray = best.rank > 0 || away_from(best.q, s.meant, s) > ASTRAY;
         }
         if is_astray {
-            rescue(is_sound, most, b, s, &mut a);
+            rescue(is_sound, most, b, s, &mut a, best);
             if a.status == CONVERGED {
                 take(b, s, &mut a, &mut other, best);
             } else if plain.status == CONVERGED && !is_sound {
                 take(b, s, &mut plain, &mut other, best);
-            } else if !is_sound {
-                best.status = a.status;
             }
         }
         if !is_near && best.status == CONVERGED && other_side(best.q, b, s) {
@@ -1212,9 +1222,19 @@ fn position_from(guess: [f64; N_COORDINATES], size: f64, most: usize, b: &mut Po
             }
         }
         if best.status == CONVERGED {
-            unwind(near, b, s, best, &mut other);
+            unwind(guess, b, s, best, &mut other);
         }
     }
+}
+
+/// Find a position from a guess, or why there is none, for a size of the mechanism.
+fn position_from(guess: [f64; N_COORDINATES], size: f64, most: usize, b: &mut Point, s: &mut Start,
+    best: &mut Attempt) {
+    s.meant = guess;
+    orient(s);
+    let mut near = s.meant;
+    judge_around(near, size, b, s);
+    find_position(near, most, b, s, best);
 }
 
 /// A good point of a motion.

@@ -38,6 +38,7 @@ class Attempt(Struct):
     status: Int
     iterations: Int
     is_thrown: Bool  # whether it went so far that rounding errors decide where it ends
+    is_crawling: Bool  # whether its corrections shrink no faster than towards a double root
     q: Row[N]  # the last position
     first: Row[N]  # the position after the first correction
     away: Real  # from the guess, in millionths of what is near, up to there
@@ -127,7 +128,7 @@ def holds(b: Point, s: Start) -> Bool:
     return True
 
 
-def holds_to_rounding(b: Point, s: Start) -> Bool:
+def vanish(b: Point, s: Start) -> Bool:
     """Return whether every equation holds as well as floating point permits."""
     scale = row(N)
     for i in range(N):
@@ -248,9 +249,9 @@ def safeguarded_step(q: Row[N], b: Point, s: Start) -> Int:
 def iterate(guess: Row[N], is_safe: Bool, most: Int, b: Point, s: Start, a: Attempt):
     """Run Newton's method from a guess, by safeguarded steps or by plain ones."""
     size: Real = 0.0
-    is_crawling: Bool = False
     a.iterations = 0
     a.is_thrown = False
+    a.is_crawling = False
     a.q = guess
     a.first = guess
     a.status = NOT_CONVERGED if place_at(guess, s.t, b) else NOT_FINITE
@@ -275,14 +276,14 @@ def iterate(guess: Row[N], is_safe: Bool, most: Int, b: Point, s: Start, a: Atte
                     a.is_thrown = True
             size = sqrt(size)
             a.iterations += 1
-            is_crawling = a.iterations > 1 and size > last / 4.0
+            a.is_crawling = a.iterations > 1 and size > last / 4.0
             if a.iterations == 1:
                 a.first = a.q
             has_ended: Bool = is_small and holds(b, s)
-            if not has_ended and (is_small or is_crawling):
-                has_ended = holds_to_rounding(b, s)
+            if not has_ended and (is_small or a.is_crawling):
+                has_ended = vanish(b, s)
             if has_ended:
                 a.status = CONVERGED
                 is_going = False
-    if is_going and is_crawling and holds(b, s):
+    if is_going and a.is_crawling and holds(b, s):
         a.status = SINGULAR

@@ -176,6 +176,7 @@ def take(b: Point, s: Start, a: Attempt, other: Attempt, best: Attempt):
     if is_better:
         best.status = a.status
         best.iterations = a.iterations
+        best.is_crawling = a.is_crawling
         best.q = a.q
         best.away = a.away
         best.rank = a.rank
@@ -277,38 +278,43 @@ def is_settled(s: Start, a: Attempt) -> Bool:
     return a.status == CONVERGED
 
 
-def rescue(is_sound: Bool, most: Int, b: Point, s: Start, a: Attempt):
+def rescue(is_sound: Bool, most: Int, b: Point, s: Start, a: Attempt, best: Attempt):
     """Make safeguarded attempts until one converges: from the guess, then further and further away.
 
     With all bodies on a line no equation tells which way to bend. Where a position was found
-    already, one is enough.
+    already, one is enough; else the best one ends as the attempt that misses the equations least.
     """
     begin = row(N)
     reach: Real = 0.0
+    least: Real = INFINITE
     for k in range(1 if is_sound else RESTARTS + 1):
         for i in range(N):
-            place = i + 1 - k if i + 1 >= k else M + i + 1 - k
             begin[i] = s.meant[i]
             if k > 0:
+                place: Int = i + 1 + RESTARTS * M - k
+                while place >= M:
+                    place -= M
                 begin[i] += reach * s.reference[i] * PROBE[place]
         iterate(begin, True, most, b, s, a)
         if a.status == CONVERGED:
             break
+        missed_now = residual(s.magnitude, b) if place_at(a.q, s.t, b) else INFINITE
+        if not is_sound and (k == 0 or missed_now < least):
+            least = missed_now
+            best.status = a.status
+            best.iterations = a.iterations
         reach += NUDGE
 
 
-def position_from(guess: Row[N], size: Real, most: Int, b: Point, s: Start, best: Attempt):
-    """Find a position from a guess, or why there is none."""
+def find_position(guess: Row[N], most: Int, b: Point, s: Start, best: Attempt):
+    """Find a position from a guess, or why there is none, judged by what was found around one."""
     plain = Attempt()
     a = Attempt()
     other = Attempt()
     s.meant = guess
-    orient(s)
-    near = copied(s.meant)
-    judge_around(near, size, b, s)
     best.status = NOT_FINITE
-    best.q = near
-    if place_at(near, s.t, b):
+    best.q = guess
+    if place_at(guess, s.t, b):
         best.status = NOT_CONVERGED
         iterate(s.meant, False, most, b, s, plain)
         while not is_settled(s, plain) and turn(plain.first, b, s):
@@ -321,13 +327,11 @@ def position_from(guess: Row[N], size: Real, most: Int, b: Point, s: Start, best
         if is_sound and not is_near:
             is_astray = best.rank > 0 or away_from(best.q, s.meant, s) > ASTRAY
         if is_astray:
-            rescue(is_sound, most, b, s, a)
+            rescue(is_sound, most, b, s, a, best)
             if a.status == CONVERGED:
                 take(b, s, a, other, best)
             elif plain.status == CONVERGED and not is_sound:
                 take(b, s, plain, other, best)
-            elif not is_sound:
-                best.status = a.status
         if not is_near and best.status == CONVERGED and other_side(best.q, b, s):
             opposite = copied(s.step)
             away = away_from(best.q, s.meant, s)
@@ -339,4 +343,13 @@ def position_from(guess: Row[N], size: Real, most: Int, b: Point, s: Start, best
                 if is_good and away_from(a.q, s.meant, s) <= reach:
                     take(b, s, a, other, best)
         if best.status == CONVERGED:
-            unwind(near, b, s, best, other)
+            unwind(guess, b, s, best, other)
+
+
+def position_from(guess: Row[N], size: Real, most: Int, b: Point, s: Start, best: Attempt):
+    """Find a position from a guess, or why there is none, for a size of the mechanism."""
+    s.meant = guess
+    orient(s)
+    near = copied(s.meant)
+    judge_around(near, size, b, s)
+    find_position(near, most, b, s, best)

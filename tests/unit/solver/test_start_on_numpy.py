@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import sympy
 
 import kincompile as kc
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
@@ -67,6 +68,20 @@ def test_that_a_guess_without_values_and_a_gap_have_their_status(example_named):
     assert started(module, module.DEFAULTS, nowhere, 1.0).status == Status.NOT_FINITE
     too_short = module.DEFAULTS * [1, 0.1, 1, 1, 1]
     assert started(module, too_short, module.GUESS, 1.0).status == Status.NOT_CONVERGED
+
+
+@pytest.mark.parametrize("near", [0.01, 0.1, 0.3, 1.0, 3.0])
+def test_that_attempts_in_vain_end_as_in_the_runtime(near):
+    """As the one that misses least; one equation has fewer numbers than restarts are shifted by."""
+    x, guess = sympy.Symbol("x"), np.array([near])
+    module = kc.compile(kc.ConstraintSystem("no_root", "x", [sympy.sqrt(x) + 1]))
+    known = kc.solve(module, [0.0], guess=guess)
+    with np.errstate(all="ignore"):  # beside the guess the root has no value
+        size = size_around(module, guess)
+    best = started(module, module.DEFAULTS, guess, size)
+    status = int(known.status[0])
+    assert best.status == (Status.NOT_CONVERGED if status == Status.NOT_ASSEMBLED else status)
+    assert best.iterations == known.iterations[0]
 
 
 def test_that_no_name_of_the_text_is_a_word_of_c():
