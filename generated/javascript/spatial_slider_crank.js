@@ -1229,28 +1229,56 @@ const spatial_slider_crank = (() => {
         const NOT_ASSEMBLED = 6, LOCK_UP = 7;
         // the criteria of the runtime
         const AGREEMENT = 1e-06, ALLOWED_PART = 0.25, ARC_CORRECTIONS = 12, AROUND = 0.002,
-            AROUND_OFFSETS = [-2.0, -1.0, 1.0, 2.0], ASSEMBLED = 1e-09, ASTRAY = 5.0, AS_NEAR = 1.1,
-            AT_EVENT = 1e-09, BEND = 0.01, BESIDE = [0.0, -1e-08, 1e-08, -1e-06, 1e-06, -1e-05],
-            CONSTANT = 1e-12, CORNER = 1e-09, FAR = 0.7853981633974483, FARTHEST = 281474976.710656,
-            FIRST_ARC = 0.01, FOLDED = 1e-09, INVOLVED = 0.02, IN_RANGE = 1e-06, KINK = 8.0,
-            LARGEST_ANGLE = 0.5, LARGE_ERROR = 0.5, LATE = 1e-06, LONGEST_ARC = 0.05, LONGEST_P = 2.0,
-            MAX_ARCS = 400, MAX_CORRECTIONS = 6, MAX_ITERATIONS = 25, MAX_SUBSTEPS = 10000,
-            MIRRORED = 2.0, MIRROR_STEP = 1e-05, MOST_MIRRORED = 300, MOST_TURNED = 300,
-            NEARLY_SINGULAR = 30.0, NEAR_ANGLE = 0.5235987755982988, NEAR_PART = 0.1, NUDGE = 0.3,
-            OTHER_SIZE = 100.0, PATIENCE = 8, RESIDUAL_FACTOR = 10.0, RESTARTS = 4, ROOT_LENGTH = 1e-13,
-            ROOT_STEPS = 80, ROUNDING = 3.552713678800501e-15, SAME_POSITION = 1e-06,
-            SAME_TIME = 8.881784197001252e-16, SETTLED = 0.5, SHORTEST_ARC = 1e-09,
-            SHORTEST_STEP = 9.5367431640625e-07, SINGULAR_SENSITIVITY = 10000000.0,
-            SMALLEST_PART = 9.5367431640625e-07, SMALL_CORRECTION = 1e-12, SMALL_ERROR = 0.05,
-            SMALL_PART = 1e-08, SMOOTH = 1e-09, SOLVED = 1e-10, SPATIAL_COORDINATES = 7,
-            STEEP = 1000000.0, STRAIGHT = 0.98, SUFFICIENT = 0.0001, THROWN = 10.0, TINY = 1e-300,
-            TOLERABLE_CORRECTION = 1e-07, TOLERANCE = 1e-10, TOO_NEAR = 100000.0, WILD = 1000.0;
+            AROUND_OFFSETS = [-2.0, -1.0, 1.0, 2.0], ASTRAY = 5.0, AS_NEAR = 1.1, AT_EVENT = 1e-09,
+            BEND = 0.01, BESIDE = [0.0, -1e-08, 1e-08, -1e-06, 1e-06, -1e-05], CONSTANT = 1e-12,
+            CORNER = 1e-09, FAR = 0.7853981633974483, FARTHEST = 281474976.710656, FIRST_ARC = 0.01,
+            FOLDED = 1e-09, INVOLVED = 0.02, IN_RANGE = 1e-06, KINK = 8.0, LARGEST_ANGLE = 0.5,
+            LARGE_ERROR = 0.5, LATE = 1e-06, LONGEST_ARC = 0.05, LONGEST_P = 2.0, MAX_ARCS = 400,
+            MAX_CORRECTIONS = 6, MAX_ITERATIONS = 25, MAX_SUBSTEPS = 10000, MIRRORED = 2.0,
+            MIRROR_STEP = 1e-05, MOST_MIRRORED = 300, NEARLY_SINGULAR = 30.0,
+            NEAR_ANGLE = 0.5235987755982988, NEAR_PART = 0.1, NUDGE = 0.3, OTHER_SIZE = 100.0,
+            PATIENCE = 8, RESIDUAL_FACTOR = 10.0, RESTARTS = 4, ROOT_LENGTH = 1e-13, ROOT_STEPS = 80,
+            ROUNDING = 3.552713678800501e-15, SAME_POSITION = 1e-06, SAME_TIME = 8.881784197001252e-16,
+            SETTLED = 0.5, SHORTEST_ARC = 1e-09, SHORTEST_STEP = 9.5367431640625e-07,
+            SINGULAR_SENSITIVITY = 10000000.0, SMALLEST_PART = 9.5367431640625e-07,
+            SMALL_CORRECTION = 1e-12, SMALL_ERROR = 0.05, SMALL_PART = 1e-08, SMOOTH = 1e-09,
+            SOLVED = 1e-10, STEEP = 1000000.0, STRAIGHT = 0.98, SUFFICIENT = 0.0001, THROWN = 10.0,
+            TINY = 1e-300, TOLERABLE_CORRECTION = 1e-07, TOLERANCE = 1e-10, TOO_NEAR = 100000.0,
+            WILD = 1000.0;
         const N = N_COORDINATES, M = N_EQUATIONS, NONZEROS = PATTERN.length;
-        const BLOCKS = point().determinants.length, PROBE = probeOf(Math.max(N, M));
+        const BLOCKS = point().determinants.length, TALL = M + N, WIDE = N + 1, TURN = 2 * Math.PI;
+        // Which coordinates are angles, or may be, and of each the first of its body's Euler parameters
+        // (N: it is none); which equations repeat others; numbers of size 1/2 to 1 and either sign without
+        // a pattern.
+        const ANGULAR = [
+            false, false, false, true, true, true, true, false, false, false, true, true, true, true,
+            false, false, false, true, true, true, true,
+        ];
+        const IS_REDUNDANT = [
+            false, false, false, false, false, false, false, false, false, false, false, false, false,
+            false, false, false, false, false, false, false, false,
+        ];
+        const PROBE = [
+            -0.8090169943749475, -0.6180339887498949, 0.9270509831248424, 0.7360679774997898,
+            -0.5450849718747373, -0.8541019662496847, 0.6631189606246322, 0.9721359549995796,
+            -0.7811529493745271, -0.5901699437494745, -0.899186938124422, 0.7082039324993694,
+            0.5172209268743169, -0.8262379212492643, -0.6352549156242118, 0.9442719099991592,
+            0.7532889043741067, -0.5623058987490541, -0.8713228931240016, -0.680339887498949,
+            0.9893568818738965,
+        ];
+        const MAY_TURN = [
+            false, false, false, false, false, false, false, false, false, false, false, false, false,
+            false, false, false, false, false, false, false, false,
+        ];
+        const COVER = [
+            21, 21, 21, 3, 3, 3, 3, 21, 21, 21, 10, 10, 10, 10, 21, 21, 21, 17, 17, 17, 17,
+        ];
 
         const norm = vector => Math.hypot(...vector);
         const largest = vector => vector.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
         const allFinite = vector => vector.every(Number.isFinite);
+        // Plain arrays: these are small, and made with each start, which takes typed ones longer.
+        const zeros = (rows, columns) => Array.from({ length: rows }, () => new Array(columns).fill(0));
 
         /* ---- dense matrices, as arrays of rows ---- */
 
@@ -1318,33 +1346,6 @@ const spatial_slider_crank = (() => {
             return upperSolution(rows, y);
         }
 
-        /* x that makes A x - b smallest: Householder's reflections. */
-        function leastSquares(matrix, right) {
-            const rows = matrix.map((row, i) => [...row, right[i]]), m = rows.length, n = rows[0].length - 1;
-            const v = new Float64Array(m);
-            for (let k = 0; k < n; k += 1) {
-                let square = 0;
-                for (let i = k; i < m; i += 1) {
-                    v[i] = rows[i][k];
-                    square += v[i] * v[i];
-                }
-                const size = v[k] > 0 ? -Math.sqrt(square) : Math.sqrt(square);
-                if (square === 0) {
-                    rows[k][k] = Infinity;  // nothing depends on it: the shortest solution leaves it
-                    continue;
-                }
-                const half = size * (size - v[k]);
-                v[k] -= size;
-                for (let j = k; j <= n; j += 1) {
-                    let dot = 0;
-                    for (let i = k; i < m; i += 1) dot += v[i] * rows[i][j];
-                    dot /= half;
-                    if (dot !== 0) for (let i = k; i < m; i += 1) rows[i][j] -= dot * v[i];
-                }
-            }
-            return upperSolution(rows, rows.slice(0, n).map(row => row[n]));
-        }
-
         /* Singular values, the smallest first, their directions on the right and what the matrix makes of
            these: Jacobi's rotations of pairs of columns. */
         function singularValues(matrix) {
@@ -1377,15 +1378,731 @@ const spatial_slider_crank = (() => {
             return found.sort((one, other) => one.size - other.size);
         }
 
-        /* ---- scales: the size of the mechanism, and what the terms of its equations contribute ---- */
+        /* ---- a position from a guess ---- */
 
-        /* Numbers of size 1/2 to 1 and either sign without a pattern. */
-        function probeOf(n) {
-            return Float64Array.from({ length: n }, (_, k) => {
-                const part = (k + 1) * ((Math.sqrt(5) - 1) / 2) % 1;
-                return (part * 64 % 2 < 1 ? 1 : -1) * (1 + part) / 2;
-            });
+        // By what positions around a guess are judged, and numbers that are worked on.
+        const new_start = () => ({
+            t: 0,
+            tolerance: 0,
+            meant: new Float64Array(N),  // the guess, with angles turned as the equations show that it is meant
+            reference: new Float64Array(N),  // scale of each coordinate
+            near: new Float64Array(N),  // how far each may be from an assembly that it is near
+            place: new Float64Array(N),  // how large it is in the guess
+            floor: 0,  // correction, in scales, below which there are only rounding errors
+            magnitude: new Float64Array(M),  // what the terms of each equation contribute at a generic position
+            noise: new Float64Array(M),  // what rounding errors of the coordinates leave of each equation
+            limit: new Float64Array(M),  // what its terms contribute at most, wherever they are
+            terms: new Float64Array(M),  // what they contribute at a point
+            step: new Float64Array(N),
+            way: new Float64Array(N),
+            matrix: zeros(TALL, WIDE),  // of equations, the last column their right side
+            directions: zeros(WIDE, WIDE),
+        });
+
+        // A run of Newton's method, and by what it is compared with others.
+        const new_attempt = () => ({
+            status: 0,
+            iterations: 0,
+            is_thrown: false,  // whether it went so far that rounding errors decide where it ends
+            is_crawling: false,  // whether its corrections shrink no faster than towards a double root
+            q: new Float64Array(N),  // the last position
+            first: new Float64Array(N),  // the position after the first correction
+            away: 0,  // from the guess, in millionths of what is near, up to there
+            rank: 0,  // 2 far from the guess, 1 on another branch than it shows, 0 as it is meant
+            far: 0,  // distance from the guess, in millionths of the scales
+        });
+
+        // Give the Euler parameters of the guess a length near one: any length is an orientation. By their
+        // largest first, since the squares of large ones overflow.
+        function orient(s) {
+            for (let i = 3; i < N; i += 1) {
+                if (COVER[i] + 3 === i) {
+                    let most = 0.0;
+                    let total = 0.0;
+                    for (let k = 0; k < 4; k += 1) {
+                        most = Math.abs(s.meant[i - k]) > most ? Math.abs(s.meant[i - k]) : most;
+                    }
+                    for (let k = 0; k < 4; k += 1) {
+                        const part = s.meant[i - k] / most;
+                        total += part * part;
+                    }
+                    const rest = Math.sqrt(total);
+                    if (most * rest > LONGEST_P || most * rest < 1.0 / LONGEST_P) {
+                        for (let k = 0; k < 4; k += 1) {
+                            s.meant[i - k] = s.meant[i - k] / most / rest;
+                        }
+                    }
+                }
+            }
         }
+
+        // Evaluate the equations at a position; return whether they have values there.
+        function place_at(q, t, b) {
+            let total = 0.0;
+            b.t = t;
+            for (let i = 0; i < N; i += 1) {
+                b.q[i] = q[i];
+            }
+            position_at(b);
+            for (let i = 0; i < M; i += 1) {
+                total += b.Phi[i];
+            }
+            return Number.isFinite(total);
+        }
+
+        // Find what the terms of each equation contribute at scales of the coordinates.
+        function find_terms(scale, b, s) {
+            s.terms.fill(0);
+            for (let e = 0; e < NONZEROS; e += 1) {
+                const i = PATTERN[e][0];
+                const j = PATTERN[e][1];
+                s.terms[i] += Math.abs(b.Phi_q[e]) * scale[j];
+            }
+            for (let i = 0; i < M; i += 1) {
+                const most = s.terms[i] <= s.limit[i] ? s.terms[i] : s.limit[i];
+                s.terms[i] = most > s.magnitude[i] ? most : s.magnitude[i];
+            }
+        }
+
+        const generic_of_judge_around = new Float64Array(N), wide_of_judge_around = new Float64Array(N);
+        // Find by what positions around one are judged.
+        function judge_around(q, size, b, s) {
+            let farthest = 0.0;
+            for (let i = 0; i < N; i += 1) {
+                s.reference[i] = ANGULAR[i] ? 1.0 : size;
+                s.near[i] = ANGULAR[i] ? NEAR_ANGLE : NEAR_PART * size;
+                s.place[i] = Math.min(Math.abs(q[i]), FARTHEST * s.reference[i]);
+                generic_of_judge_around[i] = q[i] + s.reference[i] * PROBE[i];
+                wide_of_judge_around[i] = s.reference[i] + s.place[i];
+                if (!ANGULAR[i] && s.place[i] > farthest) {
+                    farthest = s.place[i];
+                }
+            }
+            s.floor = ROUNDING * farthest / size;
+            s.magnitude.fill(0);
+            s.noise.fill(0);
+            for (let i = 0; i < M; i += 1) {
+                s.limit[i] = Infinity;
+            }
+            if (place_at(generic_of_judge_around, s.t, b)) {
+                find_terms(wide_of_judge_around, b, s);
+                for (let i = 0; i < M; i += 1) {
+                    s.noise[i] = ROUNDING * s.terms[i];
+                }
+                find_terms(s.reference, b, s);
+                for (let i = 0; i < M; i += 1) {
+                    // With 24 bits: rounding errors do not show in what is judged by it.
+                    s.magnitude[i] = rounded(s.terms[i]);
+                    s.limit[i] = s.noise[i] > 0.0 ? STEEP / ROUNDING * s.noise[i] : Infinity;
+                }
+            }
+        }
+
+        // Return whether every equation holds, relative to what its terms contribute.
+        function holds(b, s) {
+            find_terms(s.reference, b, s);
+            for (let i = 0; i < M; i += 1) {
+                if (!(Math.abs(b.Phi[i]) <= RESIDUAL_FACTOR * s.tolerance * s.terms[i] + s.noise[i])) {
+                    return false;
+                }
+            }
+            return true;
+        }
+
+        const scale_of_vanish = new Float64Array(N);
+        // Return whether every equation holds as well as floating point permits.
+        function vanish(b, s) {
+            for (let i = 0; i < N; i += 1) {
+                let size = Math.abs(b.q[i]);
+                const most = WILD * s.reference[i] + s.place[i];
+                size = size > s.reference[i] ? size : s.reference[i];
+                scale_of_vanish[i] = size < most ? size : most;
+            }
+            find_terms(scale_of_vanish, b, s);
+            for (let i = 0; i < M; i += 1) {
+                if (!(Math.abs(b.Phi[i]) <= ROUNDING * s.terms[i])) {
+                    return false;
+                }
+            }
+            return true;
+        }
+
+        // Return the terms of an equation to divide by, 1.0 where they contribute nothing.
+        function divisor(terms) {
+            return terms > 0.0 ? terms : 1.0;
+        }
+
+        // Return by how much all equations are missed, relative to terms.
+        function residual(terms, b) {
+            let total = 0.0;
+            for (let i = 0; i < M; i += 1) {
+                const part = b.Phi[i] / divisor(terms[i]);
+                total += part * part;
+            }
+            return Math.sqrt(total);
+        }
+
+        // Fill the matrix with Phi_q and the right side -Phi, in scales and relative to terms.
+        function fill_matrix(scale, terms, b, s) {
+            s.matrix.forEach(row => row.fill(0));
+            for (let e = 0; e < NONZEROS; e += 1) {
+                const i = PATTERN[e][0];
+                const j = PATTERN[e][1];
+                s.matrix[i][j] = b.Phi_q[e] * scale[j] / divisor(terms[i]);
+            }
+            for (let i = 0; i < M; i += 1) {
+                s.matrix[i][N] = -b.Phi[i] / divisor(terms[i]);
+            }
+        }
+
+        // Find the step by which so many rows miss least (Householder); return whether there is one.
+        function solve_least(s, count) {
+            let total = 0.0;
+            for (let k = 0; k < N; k += 1) {
+                let square = 0.0;
+                for (let i = k; i < count; i += 1) {
+                    square += s.matrix[i][k] * s.matrix[i][k];
+                }
+                if (square === 0.0) {
+                    // Nothing depends on it: the shortest step leaves it.
+                    s.matrix[k][k] = Infinity;
+                } else {
+                    const size = s.matrix[k][k] > 0.0 ? -Math.sqrt(square) : Math.sqrt(square);
+                    const head = s.matrix[k][k] - size;
+                    for (let j = k + 1; j < WIDE; j += 1) {
+                        let dot = head * s.matrix[k][j];
+                        for (let i = k + 1; i < count; i += 1) {
+                            dot += s.matrix[i][k] * s.matrix[i][j];
+                        }
+                        dot = dot / (-size * head);
+                        s.matrix[k][j] -= dot * head;
+                        for (let i = k + 1; i < count; i += 1) {
+                            s.matrix[i][j] -= dot * s.matrix[i][k];
+                        }
+                    }
+                    s.matrix[k][k] = size;
+                }
+            }
+            for (let n = 0; n < N; n += 1) {
+                const k = N - 1 - n;
+                let value = s.matrix[k][N];
+                for (let j = k + 1; j < N; j += 1) {
+                    value -= s.matrix[k][j] * s.step[j];
+                }
+                s.step[k] = value / s.matrix[k][k];
+                total += Math.abs(s.step[k]);
+            }
+            return Number.isFinite(total);
+        }
+
+        const trial_of_plain_step = new Float64Array(N);
+        // Apply the whole correction to a position; return CONVERGED, or why there is none.
+        function plain_step(q, b, s) {
+            for (let i = 0; i < N; i += 1) {
+                trial_of_plain_step[i] = 1.0;
+            }
+            for (let i = 0; i < M; i += 1) {
+                s.terms[i] = 1.0;
+            }
+            fill_matrix(trial_of_plain_step, s.terms, b, s);
+            if (!solve_least(s, M)) {
+                return SINGULAR;
+            }
+            for (let i = 0; i < N; i += 1) {
+                trial_of_plain_step[i] = q[i] + s.step[i];
+            }
+            return place_at(trial_of_plain_step, s.t, b) ? CONVERGED : NOT_FINITE;
+        }
+
+        const trial_of_safeguarded_step = new Float64Array(N),
+            terms_of_safeguarded_step = new Float64Array(M);
+        // Apply as much of the correction as keeps the angles near and lowers the residual. It is bent
+        // towards the gradient while the residual is large (Levenberg, Marquardt).
+        function safeguarded_step(q, b, s) {
+            find_terms(s.reference, b, s);
+            terms_of_safeguarded_step.set(s.terms);
+            const before = residual(terms_of_safeguarded_step, b);
+            fill_matrix(s.reference, terms_of_safeguarded_step, b, s);
+            for (let i = 0; i < N; i += 1) {
+                s.matrix[M + i][i] = Math.sqrt(BEND * (before < 1.0 ? before : 1.0));
+            }
+            if (!solve_least(s, M + N)) {
+                return NOT_FINITE;
+            }
+            let excess = 1.0;
+            for (let i = 0; i < N; i += 1) {
+                const part = Math.abs(s.step[i]) / (ANGULAR[i] ? LARGEST_ANGLE : 1.0);
+                excess = part > excess ? part : excess;
+                s.step[i] *= s.reference[i];
+            }
+            let part = 1.0 / excess;
+            while (part >= SHORTEST_STEP) {
+                for (let i = 0; i < N; i += 1) {
+                    trial_of_safeguarded_step[i] = q[i] + part * s.step[i];
+                }
+                if (place_at(trial_of_safeguarded_step, s.t, b)) {
+                    const after = residual(terms_of_safeguarded_step, b);
+                    if (after <= (1.0 - SUFFICIENT * part) * before || after <= ROUNDING) {
+                        return CONVERGED;
+                    }
+                }
+                part *= 0.5;
+            }
+            return NOT_CONVERGED;
+        }
+
+        // Run Newton's method from a guess, by safeguarded steps or by plain ones.
+        function iterate(guess, is_safe, most, b, s, a) {
+            let size = 0.0;
+            a.iterations = 0;
+            a.is_thrown = false;
+            a.is_crawling = false;
+            a.q.set(guess);
+            a.first.set(guess);
+            a.status = place_at(guess, s.t, b) ? NOT_CONVERGED : NOT_FINITE;
+            let is_going = a.status === NOT_CONVERGED;
+            while (is_going && a.iterations < most) {
+                const moved = is_safe ? safeguarded_step(a.q, b, s) : noted_step(a.q, b, s);
+                if (moved !== CONVERGED) {
+                    a.status = moved;
+                    is_going = false;
+                } else {
+                    let is_small = true;
+                    const last = size;
+                    size = 0.0;
+                    for (let i = 0; i < N; i += 1) {
+                        const change = b.q[i] - a.q[i];
+                        let allowed = s.tolerance > s.floor ? s.tolerance : s.floor;
+                        allowed = allowed * s.reference[i] + ROUNDING * Math.abs(b.q[i]);
+                        is_small = is_small && Math.abs(change) <= allowed;
+                        size += change * change;
+                        a.q[i] = b.q[i];
+                        if (!(Math.abs(a.q[i] - guess[i]) <= THROWN * s.near[i])) {
+                            a.is_thrown = true;
+                        }
+                    }
+                    size = Math.sqrt(size);
+                    a.iterations += 1;
+                    a.is_crawling = a.iterations > 1 && size > last / 4.0;
+                    if (a.iterations === 1) {
+                        a.first.set(a.q);
+                    }
+                    let has_ended = is_small && holds(b, s);
+                    if (!has_ended && (is_small || a.is_crawling)) {
+                        has_ended = vanish(b, s);
+                    }
+                    if (has_ended) {
+                        a.status = CONVERGED;
+                        is_going = false;
+                    }
+                }
+            }
+            if (is_going && a.is_crawling && holds(b, s)) {
+                a.status = SINGULAR;
+            }
+        }
+
+        // Find the way from a guess to a position as a mechanism shows it. Whole turns of an angle are no
+        // way, and Euler parameters p and -p are one orientation.
+        function find_way(q, guess, s) {
+            for (let i = 0; i < N; i += 1) {
+                const change = q[i] - guess[i];
+                s.way[i] = ANGULAR[i] ? change - TURN * Math.floor(change / TURN + 0.5) : change;
+            }
+            for (let i = 3; i < N; i += 1) {
+                if (COVER[i] + 3 === i) {
+                    let along = 0.0;
+                    for (let k = 0; k < 4; k += 1) {
+                        along += q[i - k] * guess[i - k];
+                    }
+                    for (let k = 0; k < 4; k += 1) {
+                        const both = q[i - k] + guess[i - k];
+                        s.way[i - k] = along < 0.0 ? both : q[i - k] - guess[i - k];
+                    }
+                }
+            }
+        }
+
+        // Return how far a position is from a guess; up to 1.0 it is near.
+        function away_from(q, guess, s) {
+            let most = 0.0;
+            find_way(q, guess, s);
+            for (let i = 0; i < N; i += 1) {
+                const part = Math.abs(s.way[i]) / s.near[i];
+                most = part <= most ? most : part;
+            }
+            return most;
+        }
+
+        const Phi_of_turn = new Float64Array(M), turns_of_turn = new Float64Array(N),
+            trial_of_turn = new Float64Array(N);
+        // Turn angles of the guess by whole turns towards its first correction; return whether any was.
+        // Only those count that the equations do not leave free by whole turns, as driven ones, and only
+        // where the equations miss less then: a step of a whole turn throws all the others far.
+        function turn(first, b, s) {
+            trial_of_turn.set(s.meant);
+            let is_turned = false;
+            if (!place_at(s.meant, s.t, b)) {
+                return false;
+            }
+            let missed_least = residual(s.magnitude, b);
+            for (let i = 0; i < M; i += 1) {
+                Phi_of_turn[i] = b.Phi[i];
+            }
+            for (let i = 0; i < N; i += 1) {
+                turns_of_turn[i] = ANGULAR[i] ? Math.floor((first[i] - s.meant[i]) / TURN + 0.5) : 0.0;
+                if (turns_of_turn[i] !== 0.0) {
+                    trial_of_turn[i] += TURN;
+                    if (place_at(trial_of_turn, s.t, b)) {
+                        for (let k = 0; k < M; k += 1) {
+                            b.Phi[k] -= Phi_of_turn[k];
+                        }
+                        if (residual(s.magnitude, b) <= SAME_POSITION) {
+                            turns_of_turn[i] = 0.0;
+                        }
+                    }
+                    trial_of_turn[i] = s.meant[i];
+                }
+            }
+            // Together first, then each alone.
+            for (let n = 0; n < N + 1; n += 1) {
+                let is_new = false;
+                trial_of_turn.set(s.meant);
+                for (let i = 0; i < N; i += 1) {
+                    if (turns_of_turn[i] !== 0.0 && (n === 0 || n === i + 1)) {
+                        trial_of_turn[i] += TURN * turns_of_turn[i];
+                        is_new = true;
+                    }
+                }
+                if (is_new && place_at(trial_of_turn, s.t, b)) {
+                    const missed_now = residual(s.magnitude, b);
+                    if (missed_now < (1.0 - SUFFICIENT) * missed_least) {
+                        missed_least = missed_now;
+                        is_turned = true;
+                        for (let i = 0; i < N; i += 1) {
+                            if (n === 0 || n === i + 1) {
+                                turns_of_turn[i] = 0.0;
+                            }
+                        }
+                        s.meant.set(trial_of_turn);
+                    }
+                }
+            }
+            return is_turned;
+        }
+
+        const trial_of_unwind = new Float64Array(N);
+        // Turn angles by whole turns towards a guess, and Euler parameters to its signs. As far as the
+        // equations allow it. Parameters that are as far from it either way become those whose largest is
+        // positive.
+        function unwind(guess, b, s, a, other) {
+            // Together first: angles that a gear or a driver connects turn together.
+            for (let n = 0; n < N + 1; n += 1) {
+                let is_new = false;
+                trial_of_unwind.set(a.q);
+                for (let i = 0; i < N; i += 1) {
+                    const is_wound = MAY_TURN[i]
+                        && Math.abs(trial_of_unwind[i] - guess[i]) > 0.5 * TURN;
+                    if (is_wound && (n === 0 || n === i + 1)) {
+                        trial_of_unwind[i] -= TURN * Math.floor((trial_of_unwind[i] - guess[i]) / TURN
+                                + 0.5);
+                        is_new = true;
+                    }
+                }
+                if (is_new) {
+                    iterate(trial_of_unwind, false, MAX_CORRECTIONS, b, s, other);
+                    let is_same = other.status === CONVERGED;
+                    for (let i = 0; i < N; i += 1) {
+                        is_same = is_same
+                            && Math.abs(other.q[i] - trial_of_unwind[i]) <= SAME_POSITION * s.reference[i];
+                    }
+                    if (is_same) {
+                        a.q.set(other.q);
+                    }
+                }
+            }
+            for (let i = 3; i < N; i += 1) {
+                if (COVER[i] + 3 === i) {
+                    let along = 0.0;
+                    let most = 0.0;
+                    trial_of_unwind.set(a.q);
+                    for (let k = 0; k < 4; k += 1) {
+                        const p = a.q[i - k];
+                        along += p * guess[i - k];
+                        most = Math.abs(p) > Math.abs(most) ? p : most;
+                        trial_of_unwind[i - k] = -p;
+                    }
+                    const is_turned = (Math.abs(along) > SAME_POSITION ? along : most) < 0.0;
+                    if (is_turned && place_at(trial_of_unwind, s.t, b) && holds(b, s)) {
+                        a.q.set(trial_of_unwind);
+                    }
+                }
+            }
+        }
+
+        const shown_of_leaves_branch = new Float64Array(BLOCKS);
+        // Return whether the guess shows a branch, and a position found from it lies on another. Nothing
+        // but the rows that are solved has a determinant where others repeat them.
+        function leaves_branch(q, b, s) {
+            let leaves = false;
+            for (let i = 0; i < M; i += 1) {
+                if (IS_REDUNDANT[i]) {
+                    return false;
+                }
+            }
+            if (!place_at(s.meant, s.t, b)) {
+                return false;
+            }
+            prepare(b);
+            for (let i = 0; i < BLOCKS; i += 1) {
+                shown_of_leaves_branch[i] = b.determinants[i];
+            }
+            if (!place_at(q, s.t, b)) {
+                return true;
+            }
+            prepare(b);
+            for (let i = 0; i < BLOCKS; i += 1) {
+                const here = b.determinants[i];
+                if (!(Math.abs(shown_of_leaves_branch[i]) > FOLDED * Math.abs(here))) {
+                    return false;
+                }
+                leaves = leaves || !(shown_of_leaves_branch[i] > 0.0 ? here > 0.0 : here < 0.0);
+            }
+            return leaves;
+        }
+
+        // Take an attempt that converged as the best one, where it is nearer to what a guess means. What
+        // is near the guess comes first, the nearest of it; then what is not far, then what is on its
+        // branch, then the nearer.
+        function take(b, s, a, other, best) {
+            unwind(s.meant, b, s, a, other);
+            const away = away_from(a.q, s.meant, s);
+            let is_far = false;
+            a.far = 0.0;
+            for (let i = 0; i < N; i += 1) {
+                const size = Math.abs(s.way[i]);
+                is_far = is_far || (MAY_TURN[i] && size > FAR);
+                a.far = size / s.reference[i] > a.far ? size / s.reference[i] : a.far;
+            }
+            a.far = Math.floor(1000000.0 * a.far + 0.5);
+            a.away = Math.floor(1000000.0 * (away < 1.0 ? away : 1.0) + 0.5);
+            a.rank = 2;
+            if (!is_far) {
+                a.rank = leaves_branch(a.q, b, s) ? 1 : 0;
+            }
+            let is_better = a.far < best.far;
+            if (best.status !== CONVERGED) {
+                is_better = true;
+            } else if (a.away !== best.away) {
+                is_better = a.away < best.away;
+            } else if (a.rank !== best.rank) {
+                is_better = a.rank < best.rank;
+            }
+            if (is_better) {
+                best.status = a.status;
+                best.iterations = a.iterations;
+                best.is_crawling = a.is_crawling;
+                best.q.set(a.q);
+                best.away = a.away;
+                best.rank = a.rank;
+                best.far = a.far;
+            }
+        }
+
+        // Rotate two columns of the matrix, and of the directions, until they are orthogonal. Return
+        // whether they were not.
+        function rotate(i, j, s) {
+            let first = 0.0;
+            let second = 0.0;
+            let mixed = 0.0;
+            for (let k = 0; k < M; k += 1) {
+                first += s.matrix[k][i] * s.matrix[k][i];
+                second += s.matrix[k][j] * s.matrix[k][j];
+                mixed += s.matrix[k][i] * s.matrix[k][j];
+            }
+            if (!(Math.abs(mixed) > ROUNDING / 16.0 * Math.sqrt(first * second))) {
+                return false;
+            }
+            const zeta = (second - first) / (2.0 * mixed);
+            let tangent = 1.0 / (Math.abs(zeta) + Math.sqrt(1.0 + zeta * zeta));
+            tangent = zeta >= 0.0 ? tangent : -tangent;
+            const cosine = 1.0 / Math.sqrt(1.0 + tangent * tangent);
+            for (let k = 0; k < M; k += 1) {
+                const x = s.matrix[k][i];
+                const y = s.matrix[k][j];
+                s.matrix[k][i] = cosine * (x - tangent * y);
+                s.matrix[k][j] = cosine * (tangent * x + y);
+            }
+            for (let k = 0; k < N; k += 1) {
+                const x = s.directions[k][i];
+                const y = s.directions[k][j];
+                s.directions[k][i] = cosine * (x - tangent * y);
+                s.directions[k][j] = cosine * (tangent * x + y);
+            }
+            return true;
+        }
+
+        // Rotate pairs of columns of the matrix until all are orthogonal (Jacobi).
+        function make_orthogonal(s) {
+            s.directions.forEach(row => row.fill(0));
+            for (let i = 0; i < N; i += 1) {
+                s.directions[i][i] = 1.0;
+            }
+            let is_done = false;
+            let sweeps = 0;
+            while (!is_done && sweeps < 60) {
+                is_done = true;
+                sweeps += 1;
+                for (let i = 0; i < N; i += 1) {
+                    for (let j = i + 1; j < N; j += 1) {
+                        if (rotate(i, j, s)) {
+                            is_done = false;
+                        }
+                    }
+                }
+            }
+        }
+
+        const trial_of_other_side = new Float64Array(N), image_of_other_side = new Float64Array(M);
+        // Find about where the mechanism can be assembled beyond the nearest singular position. Along its
+        // movement v the smallest singular value u^T Phi_q v falls to zero half way. The position is left
+        // in the step. Return whether there is one; a large mechanism is not asked.
+        function other_side(q, b, s) {
+            if (N > MOST_MIRRORED || !place_at(q, s.t, b)) {
+                return false;
+            }
+            fill_matrix(s.near, s.magnitude, b, s);
+            make_orthogonal(s);
+            let smallest = 0;
+            let least = Infinity;
+            for (let i = 0; i < N; i += 1) {
+                let square = 0.0;
+                for (let k = 0; k < M; k += 1) {
+                    square += s.matrix[k][i] * s.matrix[k][i];
+                }
+                if (square < least) {
+                    least = square;
+                    smallest = i;
+                }
+            }
+            for (let i = 0; i < M; i += 1) {
+                image_of_other_side[i] = s.matrix[i][smallest];
+            }
+            for (let i = 0; i < N; i += 1) {
+                s.way[i] = s.near[i] * s.directions[i][smallest];
+                trial_of_other_side[i] = q[i] + MIRROR_STEP * s.way[i];
+            }
+            if (!place_at(trial_of_other_side, s.t, b)) {
+                return false;
+            }
+            let bend = 0.0;
+            for (let e = 0; e < NONZEROS; e += 1) {
+                const i = PATTERN[e][0];
+                bend += image_of_other_side[i] * b.Phi_q[e] / divisor(s.magnitude[i]) * s.way[PATTERN[e][1]];
+            }
+            let total = 0.0;
+            bend = (bend - least) / MIRROR_STEP;
+            for (let i = 0; i < N; i += 1) {
+                s.step[i] = q[i] - 2.0 * least / bend * s.way[i];
+                total += s.step[i];
+            }
+            return Number.isFinite(total);
+        }
+
+        // Return whether an attempt led to an assembly so near that no nearer one is sought.
+        function is_settled(s, a) {
+            for (let i = 0; i < N; i += 1) {
+                if (!(Math.abs(a.q[i] - s.meant[i]) <= SETTLED * s.near[i])) {
+                    return false;
+                }
+            }
+            return a.status === CONVERGED;
+        }
+
+        const begin_of_rescue = new Float64Array(N);
+        // Make safeguarded attempts until one converges: from the guess, then further and further away.
+        // With all bodies on a line no equation tells which way to bend. Where a position was found
+        // already, one is enough; else the best one ends as the attempt that misses the equations least.
+        function rescue(is_sound, most, b, s, a, best) {
+            let reach = 0.0;
+            let least = Infinity;
+            for (let k = 0; k < (is_sound ? 1 : RESTARTS + 1); k += 1) {
+                for (let i = 0; i < N; i += 1) {
+                    begin_of_rescue[i] = s.meant[i];
+                    if (k > 0) {
+                        let place = i + 1 + RESTARTS * M - k;
+                        while (place >= M) {
+                            place -= M;
+                        }
+                        begin_of_rescue[i] += reach * s.reference[i] * PROBE[place];
+                    }
+                }
+                iterate(begin_of_rescue, true, most, b, s, a);
+                if (a.status === CONVERGED) {
+                    break;
+                }
+                const missed_now = place_at(a.q, s.t, b) ? residual(s.magnitude, b) : Infinity;
+                if (!is_sound && (k === 0 || missed_now < least)) {
+                    least = missed_now;
+                    best.status = a.status;
+                    best.iterations = a.iterations;
+                }
+                reach += NUDGE;
+            }
+        }
+
+        const opposite_of_find_position = new Float64Array(N);
+        // Find a position from a guess, or why there is none, judged by what was found around one.
+        function find_position(guess, most, b, s, best) {
+            const plain = new_attempt();
+            const a = new_attempt();
+            const other = new_attempt();
+            s.meant.set(guess);
+            best.status = NOT_FINITE;
+            best.q.set(guess);
+            if (place_at(guess, s.t, b)) {
+                best.status = NOT_CONVERGED;
+                iterate(s.meant, false, most, b, s, plain);
+                while (!is_settled(s, plain) && turn(plain.first, b, s)) {
+                    iterate(s.meant, false, most, b, s, plain);
+                }
+                const is_near = is_settled(s, plain);
+                const is_sound = plain.status === CONVERGED && !plain.is_thrown;
+                if (is_near || is_sound) {
+                    take_and_note(b, s, plain, other, best);
+                }
+                let is_astray = !is_near && best.status !== CONVERGED;
+                if (is_sound && !is_near) {
+                    is_astray = best.rank > 0 || away_from(best.q, s.meant, s) > ASTRAY;
+                }
+                if (is_astray) {
+                    rescue(is_sound, most, b, s, a, best);
+                    if (a.status === CONVERGED) {
+                        take_and_note(b, s, a, other, best);
+                    } else if (plain.status === CONVERGED && !is_sound) {
+                        take_and_note(b, s, plain, other, best);
+                    }
+                }
+                if (!is_near && best.status === CONVERGED && other_side(best.q, b, s)) {
+                    opposite_of_find_position.set(s.step);
+                    let away = away_from(best.q, s.meant, s);
+                    away = away > 1.0 ? away : 1.0;
+                    const reach = AS_NEAR * away < MIRRORED ? AS_NEAR * away : MIRRORED;
+                    if (away_from(opposite_of_find_position, s.meant, s) <= MIRRORED * away) {
+                        iterate(opposite_of_find_position, false, most, b, s, a);
+                        const is_good = a.status === CONVERGED && !a.is_thrown;
+                        if (is_good && away_from(a.q, s.meant, s) <= reach) {
+                            take_and_note(b, s, a, other, best);
+                        }
+                    }
+                }
+                if (best.status === CONVERGED) {
+                    unwind(guess, b, s, best, other);
+                }
+            }
+        }
+
+        /* ---- the size of the mechanism, and by what its positions are judged ---- */
 
         /* A scale with 24 bits: with rounding errors of its own, all targets judge by the same numbers. */
         function rounded(x) {
@@ -1395,24 +2112,23 @@ const spatial_slider_crank = (() => {
 
         /* The size of a mechanism as its equations show it at a guess or a position: the largest lever
            arm, else the distance over which derivatives change; 0 where equations are linear. */
-        function sizeOf(model, angular, evaluate, q) {
+        function sizeOf(evaluate, q) {
             const finite = values => largest(values.filter(Number.isFinite));
             const ofRows = (entries, isWanted) => {
-                const most = new Float64Array(model.N_EQUATIONS);
-                model.PATTERN.forEach(([i, j], k) => {
+                const most = new Float64Array(M);
+                PATTERN.forEach(([i, j], k) => {
                     if (isWanted(j) && !(most[i] >= Math.abs(entries[k]))) most[i] = Math.abs(entries[k]);
                 });
                 return most;
             };
-            const probe = probeOf(q.length);
-            const moved = (from, kind, length) => from.map((x, k) => x + (angular[k] === kind ? length * probe[k] : 0));
+            const moved = (from, kind, length) => from.map((x, k) => x + (ANGULAR[k] === kind ? length * PROBE[k] : 0));
             const { Phi_q } = evaluate(moved(q, true, 1));
-            const slopes = ofRows(Phi_q, j => !angular[j]), arms = ofRows(Phi_q, j => angular[j]);
+            const slopes = ofRows(Phi_q, j => !ANGULAR[j]), arms = ofRows(Phi_q, j => ANGULAR[j]);
             const size = finite(arms.map((arm, i) => arm / slopes[i]).filter((_, i) => slopes[i] > 0));
             if (size) return size;
-            const farthest = finite(q.filter((_, k) => !angular[k])) || 1;
+            const farthest = finite(q.filter((_, k) => !ANGULAR[k])) || 1;
             const step = SMALL_PART * farthest;
-            const length = step * finite(probe.filter((_, k) => !angular[k]));
+            const length = step * finite(q.map((_, k) => (ANGULAR[k] ? 0 : PROBE[k])));
             const bends = from => {
                 const here = evaluate(from), there = evaluate(moved(from, false, step));
                 const change = ofRows(here.Phi_q.map((x, k) => (there.Phi_q[k] - x) / length), () => true);
@@ -1430,52 +2146,29 @@ const spatial_slider_crank = (() => {
             return found > 10 * step && found < Infinity ? found : farthest;
         }
 
-        /* A mechanism with its parameters, and the scales by which all is judged, found at q. */
+        /* A mechanism with its parameters, and the scales by which all is judged, found at q; `met` are
+           assemblies that a start has met, `points` those of a run, where they are wanted. */
         class Problem {
             constructor(model, p, q, t) {
-                const { N_COORDINATES: n, N_EQUATIONS: m } = model;
-                Object.assign(this, { model, p, n, m });
-                // Euler parameters, the last of a body in space, are cosines and sines of half angles.
-                const ofEuler = ([, first, count], k) => count === SPATIAL_COORDINATES && k >= first + 3 && k < first + count;
-                const isAngle = name => model.UNITS[name] === "rad";
-                this.angular = model.COORDINATES.map((name, k) => isAngle(name) || model.BODIES.some(body => ofEuler(body, k)));
-                this.covers = model.BODIES.filter(body => body[2] === SPATIAL_COORDINATES).map(([, first]) => {
-                    return [3, 4, 5, 6].map(k => first + k);
-                });
-                const isOwned = k => model.BODIES.some(([, first, count]) => k >= first && k < first + count);
-                this.mayTurn = model.COORDINATES.map((name, k) => {
-                    return isAngle(name) || (model.UNITS[name] === "" && !isOwned(k));
-                });
-                this.size = rounded(sizeOf(model, this.angular, x => this.evaluate(x, t), Array.from(q))) || 1;
-                this.reference = Float64Array.from(this.angular, isAngle => (isAngle ? 1 : this.size));
-                // How far each coordinate of a guess may be from an assembly that it is near.
-                this.near = this.reference.map((x, k) => x * (this.angular[k] ? NEAR_ANGLE : NEAR_PART));
-                this.place = this.reference.map((x, k) => Math.min(Math.abs(q[k]), FARTHEST * x));
-                this.floor = ROUNDING * largest(this.place.filter((_, k) => !this.angular[k])) / this.size;
-                this.probe = probeOf(m);
-                this.magnitude = new Float64Array(m);
-                this.noise = new Float64Array(m);
-                this.limit = new Float64Array(m).fill(Infinity);
-                this.sums = new Float64Array(m);
-                const generic = this.evaluate(this.place.map((_, k) => q[k] + this.reference[k] * this.probe[k]), t);
-                const isKnown = allFinite(generic.Phi) && allFinite(generic.Phi_q);
-                const measured = isKnown ? generic : this.evaluate(q, t);
-                const own = this.terms(measured, this.reference).map(rounded);
-                const here = this.terms(measured, this.reference.map((x, k) => x + this.place[k])).slice();
-                this.scales = this.scalesOf(own, here.map(x => ROUNDING * x));
-                if (!isKnown) return;
-                this.magnitude = own;
-                this.noise = this.scales.noise;
-                this.limit = here.map(x => (x > 0 ? STEEP * x : Infinity));
+                Object.assign(this, new_start(), { model, p, t, n: N, tolerance: TOLERANCE, met: [], points: null });
+                this.size = rounded(sizeOf(x => this.evaluate(x, t), Array.from(q))) || 1;
+                judge_around(q, this.size, point(p), this);
+                this.scales = this.scalesAt(q, t);
             }
 
-            /* By what the march judges points. */
-            scalesOf(magnitude, noise) {
-                const { model, reference, floor } = this, redundant = model.REDUNDANT ?? [];
+            /* By what the march judges points: where a generic position has no values, by what is at q. */
+            scalesAt(q, t) {
+                const { reference, place, floor } = this, inverse = reference.map(x => 1 / x);
+                let { magnitude, noise } = this;
+                if (!magnitude.some(x => x > 0)) {
+                    const at = this.evaluate(q, t);
+                    noise = this.termsAt(at, reference.map((x, k) => x + place[k])).map(x => ROUNDING * x);
+                    magnitude = this.termsAt(at, reference).map(rounded);
+                }
                 // By what part of their terms equations of rates may be missed.
-                const part = model.EQUATIONS.map(name => (redundant.includes(name) ? AGREEMENT : SOLVED));
-                const here = magnitude.slice(), inverse = reference.map(x => 1 / x);
-                return { reference, inverse, magnitude, noise, here, part, tolerance: Math.max(TOLERANCE, floor) };
+                const part = IS_REDUNDANT.map(repeats => (repeats ? AGREEMENT : SOLVED));
+                const here = magnitude.slice(), tolerance = Math.max(TOLERANCE, floor);
+                return { reference, inverse, magnitude, noise, here, part, tolerance };
             }
 
             /* A point with Phi and Phi_q. */
@@ -1503,287 +2196,51 @@ const spatial_slider_crank = (() => {
             }
 
             /* What the terms of each equation contribute at scales of the coordinates. */
-            terms(at, scale) {
-                const { sums, magnitude, limit } = this, { PATTERN } = this.model;
-                sums.fill(0);
-                for (let k = 0; k < PATTERN.length; k += 1) {
-                    sums[PATTERN[k][0]] += Math.abs(at.Phi_q[k]) * scale[PATTERN[k][1]];
-                }
-                for (let i = 0; i < this.m; i += 1) {
-                    sums[i] = Math.max(magnitude[i], Math.min(sums[i], limit[i]));
-                }
-                return sums;
-            }
-
-            holds(at, tolerance) {
-                const { magnitude, noise } = this;
-                if (at.Phi.every((value, i) => Math.abs(value) <= tolerance * magnitude[i])) return true;
-                const terms = this.terms(at, this.reference);
-                return at.Phi.every((value, i) => Math.abs(value) <= tolerance * terms[i] + noise[i]);
-            }
-
-            /* Whether every equation holds as well as floating point permits. */
-            holdsToRounding(at) {
-                const { reference, place } = this;
-                const scale = at.q.map((x, k) => Math.min(Math.max(Math.abs(x), reference[k]), WILD * reference[k] + place[k]));
-                const terms = this.terms(at, scale);
-                return at.Phi.every((value, i) => Math.abs(value) <= ROUNDING * terms[i]);
-            }
-
-            distance(q, other, scale = this.reference) {
-                let most = 0;
-                for (let k = 0; k < this.n; k += 1) {
-                    const apart = Math.abs(q[k] - other[k]) / scale[k];
-                    if (!(apart <= most)) most = apart;
-                }
-                return most;
-            }
-
-            /* The way from a guess to a position as a mechanism shows it: whole turns of an angle are no
-               way, and Euler parameters p and -p are one orientation. */
-            apart(q, guess) {
-                const turns = (x, k) => (this.angular[k] ? 2 * Math.PI * Math.round(x / (2 * Math.PI)) : 0);
-                const way = Float64Array.from(q, (x, k) => x - guess[k] - turns(x - guess[k], k));
-                for (const cover of this.covers) {
-                    const along = cover.reduce((sum, k) => sum + q[k] * guess[k], 0);
-                    for (const k of cover) way[k] = along < 0 ? q[k] + guess[k] : q[k] - guess[k];
-                }
-                return way;
-            }
-
-            /* How long that way is, in scales. */
-            away(q, guess, scale = this.near) {
-                return largest(this.apart(q, guess).map((x, k) => x / scale[k]));
-            }
-
-            isFar(q, guess) {
-                const way = this.apart(q, guess);
-                return this.mayTurn.some((may, k) => may && Math.abs(way[k]) > FAR);
-            }
-
-            /* Whether a guess shows a branch, and a position found from it lies on another. */
-            leavesBranch(guess, found) {
-                if (this.model.REDUNDANT) return false;  // nothing has a determinant but the others' rows
-                const wanted = this.determinants(guess), here = this.determinants(found);
-                const shows = wanted.every((x, k) => x !== 0 && !(Math.abs(x) <= FOLDED * Math.abs(here[k])));
-                return shows && wanted.some((x, k) => Math.sign(x) !== Math.sign(here[k]));
-            }
-
-            /* Whether a position found from a guess is not what the guess shows. */
-            strays(guess, found) {
-                const isFar = this.isFar(found.q, guess.q) || this.away(found.q, guess.q) > ASTRAY;
-                return isFar || this.leavesBranch(guess, found);
-            }
-
-            /* About where the mechanism can be assembled beyond the nearest singular position: along its
-               movement v the smallest singular value u^T Phi_q v falls to zero half way. Null where the
-               mechanism is too large. */
-            otherSide(at) {
-                if (this.n > MOST_MIRRORED) return null;
-                const { near } = this, here = scaledRows(this, at, near);
-                if (!here.every(allFinite)) return null;
-                const [{ size, direction, image }] = singularValues(here);
-                const aside = this.evaluate(at.q.map((x, k) => x + MIRROR_STEP * near[k] * direction[k]), at.t);
-                const there = scaledRows(this, aside, near);
-                const bend = here.reduce((total, row, i) => {
-                    return total + image[i] / size * row.reduce((sum, x, k) => sum + (there[i][k] - x) * direction[k], 0);
-                }, 0) / MIRROR_STEP;
-                return at.q.map((x, k) => x - 2 * size / bend * near[k] * direction[k]);
+            termsAt(at, scale) {
+                find_terms(scale, at, this);
+                return this.terms.slice();
             }
         }
 
-        /* ---- Newton's method from a guess ---- */
+        /* ---- what is kept of a start ---- */
 
-        /* Whether corrections shrink no faster than towards a double root, by halves. */
-        function crawls(corrections) {
-            const [before, last] = corrections.slice(-2);
-            return corrections.length > 1 && last > before / 4;
+        function noted_step(q, b, equations) {
+            equations.points?.push(q.slice());
+            return plain_step(q, b, equations);
         }
 
-        function hasConverged(equations, before, at, corrections) {
-            const allowed = k => Math.max(TOLERANCE, equations.floor) * equations.reference[k] + ROUNDING * Math.abs(at.q[k]);
-            const isSmall = at.q.every((x, k) => Math.abs(x - before.q[k]) <= allowed(k));
-            if (isSmall && equations.holds(at, ASSEMBLED)) return true;
-            return (isSmall || crawls(corrections)) && equations.holdsToRounding(at);
+        function take_and_note(b, equations, attempt, other, best) {
+            take(b, equations, attempt, other, best);
+            equations.met.push({ ...attempt, q: attempt.q.slice() });
         }
 
-        const whySingular = at => (allFinite(at.Phi_q) ? SINGULAR : NOT_FINITE);
-        const moved = (equations, at, step, part = 1) => {
-            const following = equations.evaluate(at.q.map((x, k) => x + part * step[k]), at.t);
-            return allFinite(following.Phi) ? following : null;
-        };
-
-        /* The whole correction; of redundant equations that which misses all of them least. */
-        function plainStep(equations, at) {
-            const { model } = equations, factors = equations.factors(at), right = at.Phi.map(value => -value);
-            const step = model.REDUNDANT ? leastSquares(model.rows_of(at, "Phi_q"), right) : solve(factors, right);
-            if (factors.dependent.length || !allFinite(step)) return whySingular(at);
-            const following = moved(equations, at, step);
-            return following ? [following, norm(step)] : NOT_FINITE;
+        /* A position from a guess and how it was found; `other` is another one that is as near to it. */
+        function assembled(equations, t, guess) {
+            const best = new_attempt();
+            Object.assign(equations, { t, met: [] });
+            find_position(guess, MAX_ITERATIONS, point(equations.p), equations, best);
+            return { ...best, last: equations.evaluate(best.q, t), other: asNear(equations, best.q) };
         }
 
-        /* As much of the correction, bent towards the gradient while the residual is large, as keeps the
-           angles near and lowers the residual. */
-        function safeguardedStep(equations, at) {
-            const { reference, angular } = equations;
-            const weights = Array.from(equations.weights(equations.terms(at, reference)));
-            const weighed = ({ Phi }) => norm(weights.map((x, i) => x * Phi[i]));
-            const before = weighed(at), bend = Math.sqrt(BEND * Math.min(1, before));
-            const rows = equations.model.rows_of(at, "Phi_q").map((row, i) => row.map((x, k) => weights[i] * x * reference[k]));
-            if (!rows.every(allFinite)) return NOT_FINITE;
-            rows.push(...rows[0].map((_, k) => rows[0].map((_, j) => (j === k ? bend : 0))));
-            const right = [...weights.map((x, i) => -x * at.Phi[i]), ...rows[0].map(() => 0)];
-            const step = leastSquares(rows, right).map((x, k) => x * reference[k]);
-            const excess = largest(step.map((x, k) => x / (reference[k] * (angular[k] ? LARGEST_ANGLE : 1))));
-            for (let part = Math.min(1, 1 / (excess || 1)); part >= SHORTEST_STEP; part /= 2) {
-                const following = moved(equations, at, step, part);
-                const after = following && weighed(following);
-                if (following && (after <= (1 - SUFFICIENT * part) * before || after <= ROUNDING)) {
-                    return [following, part * norm(step)];
-                }
-            }
-            return NOT_CONVERGED;
-        }
-
-        /* All positions from a guess, and how they end. */
-        function iterate(equations, t, guess, most = MAX_ITERATIONS, step = plainStep) {
-            const points = [equations.evaluate(guess, t)], corrections = [];
-            const ended = status => ({ status, points, corrections, last: points[points.length - 1] });
-            if (!allFinite(points[0].Phi)) return { ...ended(NOT_FINITE), last: null };
-            for (let k = 0; k < most; k += 1) {
-                const outcome = step(equations, points[k]);
-                if (typeof outcome === "number") return ended(outcome);
-                points.push(outcome[0]);
-                corrections.push(outcome[1]);
-                if (hasConverged(equations, points[k], outcome[0], corrections)) return ended(CONVERGED);
-            }
-            const creeps = crawls(corrections) && equations.holds(points[points.length - 1], ASSEMBLED);
-            return ended(creeps ? SINGULAR : NOT_CONVERGED);
-        }
-
-        /* A position from a guess: by plain steps, and by safeguarded ones where these fail or stray; then
-           the assembly on the other side of the nearest singular position is looked at too. `other` is
-           another one that is as near to the guess. */
-        function assemble(equations, t, guess) {
-            const plain = iterate(equations, t, guess), isFound = plain.status === CONVERGED;
-            if (!plain.last || (isFound && equations.distance(plain.last.q, guess, equations.near) <= SETTLED)) return plain;
-            const meant = turned(equations, plain.points);
-            if (meant) {
-                const attempt = assemble(equations, t, meant);
-                if (attempt.status === CONVERGED) attempt.last = unwound(equations, t, attempt.last, guess);
-                return attempt;
-            }
-            const away = q => equations.away(q, guess);
-            const isSound = isFound && !isThrown(equations, plain.points);
-            let good = ordered(equations, plain.points[0], [plain]);
-            if (!isSound || equations.strays(plain.points[0], plain.last)) {
-                const attempts = safeguarded(equations, t, guess, isSound);
-                const found = ordered(equations, plain.points[0], isSound ? [plain, ...attempts] : attempts);
-                if (found.length) good = found;
-                if (!good.length) return leastMissed(equations, attempts);
-            }
-            const mirrored = equations.otherSide(good[0].last), near = Math.max(1, away(good[0].last.q));
-            if (mirrored && away(mirrored) <= MIRRORED * near) {
-                const beyond = iterate(equations, t, mirrored);
-                if (beyond.last && !isThrown(equations, beyond.points) && away(beyond.last.q) <= Math.min(AS_NEAR * near, MIRRORED)) {
-                    good = ordered(equations, plain.points[0], [...good, beyond]);
-                }
-            }
-            const [first, ...rest] = good, reach = AS_NEAR * away(first.last.q);
-            const isOther = q => equations.away(q, first.last.q, equations.reference) > SAME_POSITION && away(q) <= reach;
-            first.other = rest.find(({ last }) => isOther(last.q))?.last ?? null;
-            return first;
-        }
-
-        /* Whether a way went so far that rounding errors decide where it ends. */
-        function isThrown(equations, way) {
-            return way.some(at => !(equations.distance(at.q, way[0].q, equations.near) <= THROWN));
-        }
-
-        /* A guess with angles turned by whole turns towards its first correction, where the equations say
-           which turn is meant and miss less then; null where there is none. */
-        function turned(equations, way) {
-            const weights = equations.weights(), missed = ({ Phi }) => norm(weights.map((x, i) => x * Phi[i]));
-            const turns = way[0].q.map((x, k) => Math.round((way[Math.min(1, way.length - 1)].q[k] - x) / (2 * Math.PI)));
-            let guess = way[0];
-            const at = (some, count) => {
-                return equations.evaluate(guess.q.map((x, k) => x + (some.includes(k) ? 2 * Math.PI * count(k) : 0)), guess.t);
+        function asNear(equations, q) {
+            const { met, meant, reference, way } = equations, reach = AS_NEAR * away_from(q, meant, equations);
+            const isOther = other => {
+                if (!(away_from(other.q, meant, equations) <= reach)) return false;
+                find_way(other.q, q, equations);
+                return way.some((x, k) => Math.abs(x) > SAME_POSITION * reference[k]);
             };
-            const isBound = k => {
-                const { Phi } = at([k], () => 1);
-                return !(norm(weights.map((x, i) => x * (Phi[i] - guess.Phi[i]))) <= SAME_POSITION);
-            };
-            const columns = [...turns.keys()].filter(k => equations.angular[k] && turns[k] && isBound(k));
-            for (const some of [columns, ...(columns.length <= MOST_TURNED ? columns.map(k => [k]) : [])]) {
-                const other = at(some, k => turns[k]);
-                if (!(missed(other) < (1 - SUFFICIENT) * missed(guess))) continue;
-                guess = other;
-                for (const k of some) turns[k] = 0;
-            }
-            return guess === way[0] ? null : Float64Array.from(guess.q);
+            met.sort((a, b) => a.away - b.away || a.rank - b.rank || a.far - b.far);
+            return met.find(isOther)?.q ?? null;
         }
 
-        /* Safeguarded attempts, from further and further away until one converges. */
-        function safeguarded(equations, t, guess, isFound) {
-            const attempts = [], { reference, probe } = equations;
-            for (let k = 0; k <= (isFound ? 0 : RESTARTS); k += 1) {
-                // With all bodies on a line no equation tells which way to bend.
-                const bend = j => (k ? k * NUDGE * reference[j] * probe[(j - (k - 1) + probe.length) % probe.length] : 0);
-                const begin = Float64Array.from(guess, (x, j) => x + bend(j));
-                attempts.push(iterate(equations, t, begin, MAX_ITERATIONS, safeguardedStep));
-                if (attempts[attempts.length - 1].status === CONVERGED) break;
-            }
-            return attempts;
-        }
-
-        function leastMissed(equations, attempts) {
-            const weights = equations.weights();
-            const missed = ({ last }) => (last ? norm(weights.map((x, i) => x * last.Phi[i])) : Infinity);
-            return attempts.reduce((best, attempt) => (missed(attempt) < missed(best) ? attempt : best));
-        }
-
-        /* The attempts that converged, angles turned back: what is near the guess comes first, the nearest
-           of it; then what is not far, then what is on its branch, then the nearer. */
-        function ordered(equations, guess, attempts) {
-            const good = attempts.filter(({ status }) => status === CONVERGED);
-            const orders = new Map(good.map(attempt => {
-                const at = attempt.last = unwound(equations, guess.t, attempt.last, guess.q);
-                const away = +equations.away(at.q, guess.q).toFixed(6);
-                const isFar = equations.isFar(at.q, guess.q), leaves = !isFar && equations.leavesBranch(guess, at);
-                return [attempt, [Math.min(away, 1), isFar, leaves, +equations.away(at.q, guess.q, equations.reference).toFixed(6)]];
-            }));
-            return good.sort((one, other) => {
-                const [a, b] = [orders.get(one), orders.get(other)], k = a.findIndex((x, i) => x !== b[i]);
-                return k < 0 ? 0 : a[k] - b[k];
-            });
-        }
-
-        /* Turn angles by whole turns towards a guess, as far as the equations allow it. */
-        function unwound(equations, t, at, guess) {
-            const { angular, mayTurn } = equations;
-            const columns = [...guess.keys()].filter(k => (angular[k] || mayTurn[k]) && Math.abs(at.q[k] - guess[k]) > Math.PI);
-            const each = columns.length <= MOST_TURNED ? columns.map(k => [k]) : [];
-            for (const some of [columns, ...each]) {
-                const q = at.q.slice();
-                for (const k of some) q[k] -= 2 * Math.PI * Math.round((q[k] - guess[k]) / (2 * Math.PI));
-                if (q.every((x, k) => x === at.q[k])) continue;
-                const turned = iterate(equations, t, q, MAX_CORRECTIONS);
-                if (turned.status === CONVERGED && equations.distance(turned.last.q, q) <= SAME_POSITION) at = turned.last;
-            }
-            return covered(equations, t, at, guess);
-        }
-
-        /* Give Euler parameters the signs of a guess's, as far as the equations allow it. Where they are as
-           far from it either way, the largest one becomes positive. */
-        function covered(equations, t, at, guess) {
-            for (const cover of equations.covers) {
-                const along = cover.reduce((sum, k) => sum + at.q[k] * guess[k], 0);
-                const most = cover.reduce((best, k) => (Math.abs(at.q[k]) > Math.abs(at.q[best]) ? k : best));
-                if ((Math.abs(along) > SAME_POSITION ? along : at.q[most]) >= 0) continue;
-                const other = equations.evaluate(at.q.map((x, k) => (cover.includes(k) ? -x : x)), t);
-                if (allFinite(other.Phi) && equations.holds(other, ASSEMBLED)) at = other;
-            }
-            return at;
+        /* All positions of plain Newton from a guess, and how it ends. */
+        function iterates(equations, t, guess) {
+            const run = new_attempt(), points = [];
+            Object.assign(equations, { t, points });
+            iterate(guess, false, MAX_ITERATIONS, point(equations.p), equations, run);
+            equations.points = null;
+            if (points.length <= run.iterations) points.push(run.q);
+            return { status: run.status, points: points.map(q => equations.evaluate(q, t)) };
         }
 
         /* ---- from time to time ---- */
@@ -2077,18 +2534,6 @@ const spatial_slider_crank = (() => {
 
         /* ---- the whole grid ---- */
 
-        /* A guess with Euler parameters of a length near one: any length is an orientation. By their largest
-           first, since the squares of large ones overflow. */
-        function oriented(model, guess) {
-            const q = Float64Array.from(guess);
-            for (const [, first] of model.BODIES.filter(body => body[2] === SPATIAL_COORDINATES)) {
-                const p = q.subarray(first + 3, first + 7), most = Math.max(...p.map(Math.abs));
-                const rest = Math.sqrt(p.reduce((sum, x) => sum + (x / most) ** 2, 0)), length = most * rest;
-                if (length > LONGEST_P || length < 1 / LONGEST_P) p.forEach((x, k) => { p[k] = x / most / rest; });
-            }
-            return q;
-        }
-
         /* The times at which the velocity of a driver jumps, as the runtime finds them. */
         function cornersOf(model, times, p, guess) {
             if (!model.CORNERS) return times.map(() => 0);
@@ -2114,7 +2559,8 @@ const spatial_slider_crank = (() => {
                 status: new Int32Array(count).fill(NOT_REACHED), iterations: new Int32Array(count),
                 failed: null, near: [], other: null, strays: false,
             };
-            guess = oriented(model, guess);
+            guess = Float64Array.from(guess);
+            orient({ meant: guess });
             const corners = cornersOf(model, Float64Array.from(times), p, guess);
             const timeOf = k => times[k] + corners[k];
             let outcome = start(model, p, guess, timeOf(0));
@@ -2180,28 +2626,28 @@ const spatial_slider_crank = (() => {
         /* Assemble the mechanism at the first time. */
         function start(model, p, guess, t) {
             const rough = new Problem(model, p, guess, t);
-            const attempt = assemble(rough, t, Float64Array.from(guess)), iterations = attempt.corrections.length;
-            if (attempt.status !== CONVERGED) {
-                const status = attempt.status === NOT_CONVERGED ? NOT_ASSEMBLED : attempt.status;
-                return { status, iterations, equations: rough, state: null, position: null, nearest: attempt.last };
+            const { status: found, iterations, is_crawling, last: at, other } = assembled(rough, t, guess);
+            if (found !== CONVERGED) {
+                const status = found === NOT_CONVERGED ? NOT_ASSEMBLED : found;
+                return { status, iterations, equations: rough, state: null, position: null, nearest: at };
             }
-            const at = attempt.last;
             let status = completed(at, rough);
             // Towards a singular position Newton's method creeps, and ends a rounding error before it.
-            if (status === CONVERGED && crawls(attempt.corrections) && at.sensitivity > TOO_NEAR) status = SINGULAR;
+            if (status === CONVERGED && is_crawling && at.sensitivity > TOO_NEAR) status = SINGULAR;
             // The guess may be rough: from here on the assembled mechanism gives the size.
             const equations = new Problem(model, p, at.q, t);
-            const elsewhere = attempt.other?.q.map((x, k) => (x - at.q[k]) / rough.reference[k]);
+            const elsewhere = other?.map((x, k) => (x - at.q[k]) / rough.reference[k]);
+            rough.meant.set(guess);
             return {
                 status, iterations, equations, state: status === CONVERGED ? at : null, position: at,
                 other: elsewhere ? involved(model, elsewhere) : null,
-                strays: rough.leavesBranch(rough.evaluate(guess, t), at),
+                strays: leaves_branch(at.q, point(p), rough),
             };
         }
 
         /* What is there at a time that the motion does not reach. */
         function giveUp(equations, outcome, t) {
-            const attempt = assemble(equations, t, outcome.state.q);
+            const attempt = assembled(equations, t, outcome.state.q);
             const jumps = attempt.status === CONVERGED;
             return { ...outcome, status: jumps ? outcome.status : attempt.status, nearest: attempt.last, jumps };
         }
@@ -2248,7 +2694,7 @@ const spatial_slider_crank = (() => {
             constructor(equations, state, time) {
                 this.equations = equations;
                 this.scale = [...equations.reference, time];
-                this.weights = equations.weights(equations.terms(state, equations.reference));
+                this.weights = equations.weights(equations.termsAt(state, equations.reference));
             }
 
             /* A point of the motion as one of the curve, looking forward or back in time. */
@@ -2481,7 +2927,7 @@ const spatial_slider_crank = (() => {
         }
 
         return {
-            linear: { factor, solve, singularValues }, norm, iterate, Problem, scaledRows, between,
+            linear: { factor, solve, singularValues }, norm, iterates, Problem, scaledRows, between,
             solve: motionOver, explain,
         };
     })();

@@ -6,7 +6,7 @@ class Curve {
     constructor(equations, state, time) {
         this.equations = equations;
         this.scale = [...equations.reference, time];
-        this.weights = equations.weights(equations.terms(state, equations.reference));
+        this.weights = equations.weights(equations.termsAt(state, equations.reference));
     }
 
     /* A point of the motion as one of the curve, looking forward or back in time. */

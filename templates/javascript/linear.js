@@ -64,33 +64,6 @@ function solve({ rows, order }, b) {
     return upperSolution(rows, y);
 }
 
-/* x that makes A x - b smallest: Householder's reflections. */
-function leastSquares(matrix, right) {
-    const rows = matrix.map((row, i) => [...row, right[i]]), m = rows.length, n = rows[0].length - 1;
-    const v = new Float64Array(m);
-    for (let k = 0; k < n; k += 1) {
-        let square = 0;
-        for (let i = k; i < m; i += 1) {
-            v[i] = rows[i][k];
-            square += v[i] * v[i];
-        }
-        const size = v[k] > 0 ? -Math.sqrt(square) : Math.sqrt(square);
-        if (square === 0) {
-            rows[k][k] = Infinity;  // nothing depends on it: the shortest solution leaves it
-            continue;
-        }
-        const half = size * (size - v[k]);
-        v[k] -= size;
-        for (let j = k; j <= n; j += 1) {
-            let dot = 0;
-            for (let i = k; i < m; i += 1) dot += v[i] * rows[i][j];
-            dot /= half;
-            if (dot !== 0) for (let i = k; i < m; i += 1) rows[i][j] -= dot * v[i];
-        }
-    }
-    return upperSolution(rows, rows.slice(0, n).map(row => row[n]));
-}
-
 /* Singular values, the smallest first, their directions on the right and what the matrix makes of
    these: Jacobi's rotations of pairs of columns. */
 function singularValues(matrix) {

@@ -45,18 +45,6 @@ function advance(equations, from, t) {
 
 /* ---- the whole grid ---- */
 
-/* A guess with Euler parameters of a length near one: any length is an orientation. By their largest
-   first, since the squares of large ones overflow. */
-function oriented(model, guess) {
-    const q = Float64Array.from(guess);
-    for (const [, first] of model.BODIES.filter(body => body[2] === SPATIAL_COORDINATES)) {
-        const p = q.subarray(first + 3, first + 7), most = Math.max(...p.map(Math.abs));
-        const rest = Math.sqrt(p.reduce((sum, x) => sum + (x / most) ** 2, 0)), length = most * rest;
-        if (length > LONGEST_P || length < 1 / LONGEST_P) p.forEach((x, k) => { p[k] = x / most / rest; });
-    }
-    return q;
-}
-
 /* The times at which the velocity of a driver jumps, as the runtime finds them. */
 function cornersOf(model, times, p, guess) {
     if (!model.CORNERS) return times.map(() => 0);
@@ -82,7 +70,8 @@ function motionOver(model, times, p = model.DEFAULTS, guess = model.GUESS) {
         status: new Int32Array(count).fill(NOT_REACHED), iterations: new Int32Array(count),
         failed: null, near: [], other: null, strays: false,
     };
-    guess = oriented(model, guess);
+    guess = Float64Array.from(guess);
+    orient({ meant: guess });
     const corners = cornersOf(model, Float64Array.from(times), p, guess);
     const timeOf = k => times[k] + corners[k];
     let outcome = start(model, p, guess, timeOf(0));
@@ -148,28 +137,28 @@ function measuredAgain(equations, { q, t }) {
 /* Assemble the mechanism at the first time. */
 function start(model, p, guess, t) {
     const rough = new Problem(model, p, guess, t);
-    const attempt = assemble(rough, t, Float64Array.from(guess)), iterations = attempt.corrections.length;
-    if (attempt.status !== CONVERGED) {
-        const status = attempt.status === NOT_CONVERGED ? NOT_ASSEMBLED : attempt.status;
-        return { status, iterations, equations: rough, state: null, position: null, nearest: attempt.last };
+    const { status: found, iterations, is_crawling, last: at, other } = assembled(rough, t, guess);
+    if (found !== CONVERGED) {
+        const status = found === NOT_CONVERGED ? NOT_ASSEMBLED : found;
+        return { status, iterations, equations: rough, state: null, position: null, nearest: at };
     }
-    const at = attempt.last;
     let status = completed(at, rough);
     // Towards a singular position Newton's method creeps, and ends a rounding error before it.
-    if (status === CONVERGED && crawls(attempt.corrections) && at.sensitivity > TOO_NEAR) status = SINGULAR;
+    if (status === CONVERGED && is_crawling && at.sensitivity > TOO_NEAR) status = SINGULAR;
     // The guess may be rough: from here on the assembled mechanism gives the size.
     const equations = new Problem(model, p, at.q, t);
-    const elsewhere = attempt.other?.q.map((x, k) => (x - at.q[k]) / rough.reference[k]);
+    const elsewhere = other?.map((x, k) => (x - at.q[k]) / rough.reference[k]);
+    rough.meant.set(guess);
     return {
         status, iterations, equations, state: status === CONVERGED ? at : null, position: at,
         other: elsewhere ? involved(model, elsewhere) : null,
-        strays: rough.leavesBranch(rough.evaluate(guess, t), at),
+        strays: leaves_branch(at.q, point(p), rough),
     };
 }
 
 /* What is there at a time that the motion does not reach. */
 function giveUp(equations, outcome, t) {
-    const attempt = assemble(equations, t, outcome.state.q);
+    const attempt = assembled(equations, t, outcome.state.q);
     const jumps = attempt.status === CONVERGED;
     return { ...outcome, status: jumps ? outcome.status : attempt.status, nearest: attempt.last, jumps };
 }

@@ -19,16 +19,20 @@ const newton = (() => {
      led to it; and how they end: 'converged', 'singular' (then `dependent` are columns of Phi_q at
      the last iterate), 'not finite' or 'not converged'. */
   function iterate(model, guess, t, p = model.DEFAULTS) {
-    const equations = problem(model, p), run = model.solver.iterate(equations, t, guess);
-    const iterates = run.points.map((at, k) => ({
-      q: Array.from(at.q), Phi: Array.from(at.Phi), Phi_q: model.rows_of(at, 'Phi_q'),
-      factors: equations.factors(at), correction: k ? run.corrections[k - 1] : NaN,
-      step: k ? Array.from(at.q, (x, j) => x - run.points[k - 1].q[j]) : null,
-    }));
-    const last = iterates[iterates.length - 1], isStopped = run.status === 2 && last.factors.dependent.length;
+    const equations = problem(model, p), { status, points } = model.solver.iterates(equations, t, guess);
+    const iterates = points.map((at, k) => {
+      const step = k ? Array.from(at.q, (x, j) => x - points[k - 1].q[j]) : null;
+      const Phi_q = model.rows_of(at, 'Phi_q'), factors = equations.factors(at);
+      return { q: Array.from(at.q), Phi: Array.from(at.Phi), Phi_q, factors, step, correction: step ? norm(step) : NaN };
+    });
+    // From where Phi_q is singular but for rounding, the solver steps far away.
+    const hasStep = (_, k) => k < iterates.length - 1 || status > 1;
+    const stop = iterates.findIndex((item, k) => hasStep(item, k) && item.factors.dependent.length);
+    const isFinite = stop >= 0 && iterates[stop].Phi_q.flat().every(Number.isFinite);
+    const ended = stop < 0 ? status : isFinite ? 2 : 3;
     return {
-      status: STATUSES[run.status], iterates, scale: Array.from(equations.reference),
-      dependent: isStopped ? last.factors.dependent : [],
+      status: STATUSES[ended], iterates: stop < 0 ? iterates : iterates.slice(0, stop + 1),
+      scale: Array.from(equations.reference), dependent: isFinite ? iterates[stop].factors.dependent : [],
     };
   }
 

@@ -1,6 +1,7 @@
 """The start of emitted code: from rough guesses it leads where the runtime does."""
 
 import ctypes
+import json
 import subprocess
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 import kincompile as kc
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.runtime.status import Status
-from tests.targets.conftest import run_rust
+from tests.targets.conftest import NODE, in_node, run_rust
 from tests.unit.solver.conftest import rough_guesses, size_around
 
 pytestmark = [
@@ -36,6 +37,20 @@ def starts(example_named):
         assert len({tuple(np.round(q, 3)) for q in ends}) > 3
         known[name] = guesses, sizes, ends
     return known
+
+
+# ---------------------------------------------------------------- JavaScript
+
+
+@pytest.mark.skipif(NODE is None, reason="node is not installed (Debian: nodejs)")
+@pytest.mark.parametrize("name", STARTS)
+def test_that_javascript_ends_where_the_runtime_does(starts, example_named, tmp_path, name):
+    guesses, _, ends = starts[name]
+    kc.emit(example_named(name).model, "javascript").write(tmp_path)
+    started = f"g => Array.from({name}.solver.solve({name}, [0], {name}.DEFAULTS, g).q)"
+    given = json.dumps([guess.tolist() for guess in guesses])
+    found = json.loads(in_node(tmp_path, {name: name}, f"JSON.stringify({given}.map({started}))"))
+    np.testing.assert_allclose(found, ends, rtol=0, atol=1e-8)
 
 
 # ---------------------------------------------------------------- Rust

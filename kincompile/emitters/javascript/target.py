@@ -11,7 +11,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from kincompile import criteria, quantities
-from kincompile.emitters.constants import named_lists, splines
+from kincompile.emitters.constants import items, named_lists, splines
 from kincompile.emitters.javascript.dialect import JAVASCRIPT
 from kincompile.emitters.javascript.functions import (
     WRITE,
@@ -24,19 +24,21 @@ from kincompile.emitters.javascript.march import JavaScriptSolver
 from kincompile.emitters.lines import indented, wrapped
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.planned_solve import schedule_solve
+from kincompile.emitters.solver_tables import solver_tables
 from kincompile.emitters.templates import fill, read
-from kincompile.solver.reader import solver
+from kincompile.solver.reader import solver, start
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
     from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.program import Program
 
 DIALECT = JAVASCRIPT
 
-MARCH = "march"
-PARTS = ("linear.js", "position.js", MARCH, "march.js", "events.js")
-"""The parts of the solver, in order: templates, and the march that is printed."""
+START, MARCH = "start", "march"
+PARTS = ("linear.js", START, "position.js", MARCH, "march.js", "events.js")
+"""The parts of the solver, in order: templates, and start and march, which are printed."""
 
 KEYWORDS = (
     "arguments", "await", "break", "case", "catch", "class", "const", "continue", "debugger",
@@ -106,7 +108,7 @@ def files(
         "tables": indented(splines(program, "const {} = {{", "[")),
         "table_names": ", ".join(program.tables),
         "vectors": indented(vectors(code), 3),
-        "solver": "" if listing is None else _solver(),
+        "solver": "" if listing is None else _solver(program),
         "returned": indented(
             wrapped(
                 [*(item.name for item in program.quantities), *(f"{name}_at" for name in functions)]
@@ -117,17 +119,28 @@ def files(
     return {f"{program.name}.js": fill("javascript/module.js.jinja", data)}
 
 
+def _solver(program: Program) -> str:
+    """Return the script that solves for the motion."""
+    tables = []
+    for name, values in solver_tables(program).items():
+        tables += [f"const {name} = [", *indented(wrapped(items(values))).split("\n"), "];"]
+    slots = _parts() | {"tables": indented(tables)}
+    return indented(fill("javascript/solver.js.jinja", slots).rstrip().split("\n"))
+
+
 @cache
-def _solver() -> str:
-    """Return the script that solves for the motion, with the criteria that it uses."""
-    march = JavaScriptSolver(solver(is_careful=True)).text()
-    march = f"/* ---- from time to time ---- */\n\n{march}"
-    parts = "\n".join(march if x == MARCH else read(f"javascript/{x}") for x in PARTS)
+def _parts() -> dict[str, str]:
+    """Return what is the same for every mechanism: the parts, and the criteria that they use."""
+    printed = {
+        START: "/* ---- a position from a guess ---- */\n\n" + JavaScriptSolver(start()).text(),
+        MARCH: "/* ---- from time to time ---- */\n\n"
+        + JavaScriptSolver(solver(is_careful=True)).text(),
+    }
+    parts = "\n".join(printed.get(x) or read(f"javascript/{x}") for x in PARTS)
     used = set(re.findall(r"\b[A-Z_]+\b", parts)) & vars(criteria).keys()
     numbers = wrapped(f"{name} = {json.dumps(getattr(criteria, name))}" for name in sorted(used))
     text = "\n".join(f"        {line}" for line in numbers).strip().rstrip(",")
-    slots = {"criteria": text, "parts": indented(parts.rstrip().split("\n"))}
-    return indented(fill("javascript/solver.js.jinja", slots).rstrip().split("\n"))
+    return {"criteria": text, "parts": indented(parts.rstrip().split("\n"))}
 
 
 def _lists(code: InlineProgram) -> dict[str, list[str]]:
