@@ -1752,9 +1752,11 @@ static int turn(const double *first, strip *b, start *s)
     // Together first, then each alone.
     for (int n = 0; n < N + 1; n++) {
         int is_new = 0;
+        const int low = n == 0 ? 0 : n - 1;
+        const int high = n == 0 ? N : n;
         memcpy(trial, s->meant, sizeof trial);
-        for (int i = 0; i < N; i++)
-            if (turns[i] != 0.0 && (n == 0 || n == i + 1)) {
+        for (int i = low; i < high; i++)
+            if (turns[i] != 0.0) {
                 trial[i] += TURN * turns[i];
                 is_new = 1;
             }
@@ -1763,9 +1765,8 @@ static int turn(const double *first, strip *b, start *s)
             if (missed_now < (1.0 - SUFFICIENT) * missed_least) {
                 missed_least = missed_now;
                 is_turned = 1;
-                for (int i = 0; i < N; i++)
-                    if (n == 0 || n == i + 1)
-                        turns[i] = 0.0;
+                for (int i = low; i < high; i++)
+                    turns[i] = 0.0;
                 memcpy(s->meant, trial, sizeof s->meant);
             }
         }
@@ -1781,15 +1782,15 @@ static void unwind(const double *guess, strip *b, start *s, attempt *a, attempt 
     // Together first: angles that a gear or a driver connects turn together.
     for (int n = 0; n < N + 1; n++) {
         int is_new = 0;
+        const int low = n == 0 ? 0 : n - 1;
+        const int high = n == 0 ? N : n;
         double trial[N];
         memcpy(trial, a->q, sizeof trial);
-        for (int i = 0; i < N; i++) {
-            const int is_wound = MAY_TURN[i] && fabs(trial[i] - guess[i]) > 0.5 * TURN;
-            if (is_wound && (n == 0 || n == i + 1)) {
+        for (int i = low; i < high; i++)
+            if (MAY_TURN[i] && fabs(trial[i] - guess[i]) > 0.5 * TURN) {
                 trial[i] -= TURN * floor((trial[i] - guess[i]) / TURN + 0.5);
                 is_new = 1;
             }
-        }
         if (is_new) {
             iterate(trial, 0, MAX_CORRECTIONS, b, s, other);
             int is_same = other->status == CAM_BY_TABLE_CONVERGED;

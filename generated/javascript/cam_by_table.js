@@ -872,9 +872,11 @@ const cam_by_table = (() => {
             // Together first, then each alone.
             for (let n = 0; n < N + 1; n += 1) {
                 let is_new = false;
+                const low = n === 0 ? 0 : n - 1;
+                const high = n === 0 ? N : n;
                 trial_of_turn.set(s.meant);
-                for (let i = 0; i < N; i += 1) {
-                    if (turns_of_turn[i] !== 0.0 && (n === 0 || n === i + 1)) {
+                for (let i = low; i < high; i += 1) {
+                    if (turns_of_turn[i] !== 0.0) {
                         trial_of_turn[i] += TURN * turns_of_turn[i];
                         is_new = true;
                     }
@@ -884,10 +886,8 @@ const cam_by_table = (() => {
                     if (missed_now < (1.0 - SUFFICIENT) * missed_least) {
                         missed_least = missed_now;
                         is_turned = true;
-                        for (let i = 0; i < N; i += 1) {
-                            if (n === 0 || n === i + 1) {
-                                turns_of_turn[i] = 0.0;
-                            }
+                        for (let i = low; i < high; i += 1) {
+                            turns_of_turn[i] = 0.0;
                         }
                         s.meant.set(trial_of_turn);
                     }
@@ -904,11 +904,11 @@ const cam_by_table = (() => {
             // Together first: angles that a gear or a driver connects turn together.
             for (let n = 0; n < N + 1; n += 1) {
                 let is_new = false;
+                const low = n === 0 ? 0 : n - 1;
+                const high = n === 0 ? N : n;
                 trial_of_unwind.set(a.q);
-                for (let i = 0; i < N; i += 1) {
-                    const is_wound = MAY_TURN[i]
-                        && Math.abs(trial_of_unwind[i] - guess[i]) > 0.5 * TURN;
-                    if (is_wound && (n === 0 || n === i + 1)) {
+                for (let i = low; i < high; i += 1) {
+                    if (MAY_TURN[i] && Math.abs(trial_of_unwind[i] - guess[i]) > 0.5 * TURN) {
                         trial_of_unwind[i] -= TURN * Math.floor((trial_of_unwind[i] - guess[i]) / TURN
                                 + 0.5);
                         is_new = true;

@@ -1037,9 +1037,11 @@ fn turn(first: [f64; N_COORDINATES], b: &mut Point, s: &mut Start) -> bool {
     // Together first, then each alone.
     for n in 0..N_COORDINATES + 1 {
         let mut is_new = false;
+        let low = if n == 0 { 0 } else { n - 1 };
+        let high = if n == 0 { N_COORDINATES } else { n };
         trial = s.meant;
-        for i in 0..N_COORDINATES {
-            if turns[i] != 0.0 && (n == 0 || n == i + 1) {
+        for i in low..high {
+            if turns[i] != 0.0 {
                 trial[i] += TURN * turns[i];
                 is_new = true;
             }
@@ -1049,10 +1051,8 @@ fn turn(first: [f64; N_COORDINATES], b: &mut Point, s: &mut Start) -> bool {
             if missed_now < (1.0 - SUFFICIENT) * missed_least {
                 missed_least = missed_now;
                 is_turned = true;
-                for i in 0..N_COORDINATES {
-                    if n == 0 || n == i + 1 {
-                        turns[i] = 0.0;
-                    }
+                for i in low..high {
+                    turns[i] = 0.0;
                 }
                 s.meant = trial;
             }
@@ -1069,10 +1069,11 @@ fn unwind(guess: [f64; N_COORDINATES], b: &mut Point, s: &mut Start, a: &mut Att
     // Together first: angles that a gear or a driver connects turn together.
     for n in 0..N_COORDINATES + 1 {
         let mut is_new = false;
+        let low = if n == 0 { 0 } else { n - 1 };
+        let high = if n == 0 { N_COORDINATES } else { n };
         let mut trial = a.q;
-        for i in 0..N_COORDINATES {
-            let is_wound = MAY_TURN[i] && (trial[i] - guess[i]).abs() > 0.5 * TURN;
-            if is_wound && (n == 0 || n == i + 1) {
+        for i in low..high {
+            if MAY_TURN[i] && (trial[i] - guess[i]).abs() > 0.5 * TURN {
                 trial[i] -= TURN * ((trial[i] - guess[i]) / TURN + 0.5).floor();
                 is_new = true;
             }

@@ -67,9 +67,11 @@ def turn(first: Row[N], b: Point, s: Start) -> Bool:
     # Together first, then each alone.
     for n in range(N + 1):
         is_new: Bool = False
+        low = 0 if n == 0 else n - 1
+        high = N if n == 0 else n
         trial = copied(s.meant)
-        for i in range(N):
-            if turns[i] != 0.0 and (n == 0 or n == i + 1):
+        for i in range(low, high):
+            if turns[i] != 0.0:
                 trial[i] += TURN * turns[i]
                 is_new = True
         if is_new and place_at(trial, s.t, b):
@@ -77,9 +79,8 @@ def turn(first: Row[N], b: Point, s: Start) -> Bool:
             if missed_now < (1.0 - SUFFICIENT) * missed_least:
                 missed_least = missed_now
                 is_turned = True
-                for i in range(N):
-                    if n == 0 or n == i + 1:
-                        turns[i] = 0.0
+                for i in range(low, high):
+                    turns[i] = 0.0
                 s.meant = trial
     return is_turned
 
@@ -93,10 +94,11 @@ def unwind(guess: Row[N], b: Point, s: Start, a: Attempt, other: Attempt):
     # Together first: angles that a gear or a driver connects turn together.
     for n in range(N + 1):
         is_new: Bool = False
+        low = 0 if n == 0 else n - 1
+        high = N if n == 0 else n
         trial = copied(a.q)
-        for i in range(N):
-            is_wound = MAY_TURN[i] and abs(trial[i] - guess[i]) > 0.5 * TURN
-            if is_wound and (n == 0 or n == i + 1):
+        for i in range(low, high):
+            if MAY_TURN[i] and abs(trial[i] - guess[i]) > 0.5 * TURN:
                 trial[i] -= TURN * floor((trial[i] - guess[i]) / TURN + 0.5)
                 is_new = True
         if is_new:
