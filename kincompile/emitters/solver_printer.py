@@ -52,6 +52,8 @@ Lines = list[str]
 class SolverPrinter:
     """Prints a solver; a language overrides what it writes differently."""
 
+    remark, negation, continued = "//", "!", ""
+    """What begins a comment, negates a truth, and ends a line that goes on."""
     signs: Mapping[str, str] = {"and": "&&", "or": "||"}
     calls: Mapping[str, str] = {}
     """What functions of numbers are called."""
@@ -83,14 +85,14 @@ class SolverPrinter:
         for line in self.inner(item.body):
             depth = len(line) - len(line.lstrip())
             first, *rest = broken(line.strip(), WIDTH - depth - 4, MARKS)
-            lines.append(" " * depth + first)
-            lines += [" " * (depth + 4) + x for x in rest]
+            parts = [" " * depth + first, *(" " * (depth + 4) + x for x in rest)]
+            lines += [*(x + self.continued for x in parts[:-1]), parts[-1]]
         return lines
 
     def about(self, text: str) -> Lines:
         """Return what is said of a function or struct, as comments."""
         paragraphs = " ".join(text.split())
-        return [f"// {line}" for line in textwrap.wrap(paragraphs, WIDTH - 4)]
+        return [f"{self.remark} {line}" for line in textwrap.wrap(paragraphs, WIDTH - 4)]
 
     # ------------------------------------------------------------ statements
 
@@ -106,7 +108,7 @@ class SolverPrinter:
         """Return the lines of a statement."""
         match node:
             case Comment(lines):
-                return [f"// {line}" for line in lines]
+                return [f"{self.remark} {line}" for line in lines]
             case Declare():
                 return self.declared(node)
             case Assign():
@@ -171,7 +173,7 @@ class SolverPrinter:
             case Unary("neg", operand):
                 return f"-{self.at(operand, SIGN)}", SIGN
             case Unary(_, operand):
-                return f"!{self.at(operand, SIGN)}", SIGN
+                return f"{self.negation}{self.at(operand, SIGN)}", SIGN
             case Binary(sign, left, right):
                 return self.binary(sign, left, right)
             case Choice(condition, then, otherwise):
@@ -193,7 +195,11 @@ class SolverPrinter:
         # gcc warns of && within || without parentheses
         inner = own + 2 if sign == "or" else own
         first = self.at(left, own if isinstance(left, Binary) and left.operation == sign else inner)
-        return f"{first} {self.signs.get(sign, sign)} {self.at(right, max(inner, own + 1))}", own
+        return f"{first} {self.sign(sign, left, right)} {self.at(right, max(inner, own + 1))}", own
+
+    def sign(self, sign: str, left: Expression, right: Expression) -> str:
+        """Return how an operation on two operands is written."""
+        return self.signs.get(sign, sign)
 
     def choice(
         self, condition: Expression, then: Expression, otherwise: Expression

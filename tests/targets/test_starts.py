@@ -10,7 +10,8 @@ import pytest
 import kincompile as kc
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.runtime.status import Status
-from tests.targets.conftest import NODE, in_node, run_rust
+from tests.adversary.test_starts import in_octave
+from tests.targets.conftest import NEEDED, NODE, OCTAVE, in_node, run_rust
 from tests.unit.solver.conftest import rough_guesses, size_around
 
 pytestmark = [
@@ -80,6 +81,19 @@ def test_that_rust_ends_where_the_runtime_does(starts, example_named, tmp_path):
     for line, q in zip(rows, known, strict=True):
         found = [float(x) for x in line.strip("[]").split(", ")]
         np.testing.assert_allclose(found, q, rtol=0, atol=1e-8)
+
+
+# ---------------------------------------------------------------- Octave
+
+
+@pytest.mark.skipif(OCTAVE is None, reason=NEEDED["octave"][1])
+@pytest.mark.parametrize("name", STARTS)
+def test_that_octave_ends_where_the_runtime_does(starts, example_named, tmp_path, name):
+    guesses, _, ends = starts[name]
+    found = in_octave(tmp_path, example_named(name).model, guesses)
+    for (is_found, q), known in zip(found, ends, strict=True):
+        assert is_found
+        np.testing.assert_allclose(q, known, rtol=0, atol=1e-8)
 
 
 # ---------------------------------------------------------------- C

@@ -10,20 +10,24 @@ import math
 from typing import TYPE_CHECKING
 
 from kincompile import criteria, quantities
-from kincompile.emitters.lines import indented, pieces
+from kincompile.emitters.constants import items
+from kincompile.emitters.lines import indented, pieces, wrapped
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.octave.dialect import NAMES, OCTAVE
+from kincompile.emitters.octave.march import PLACES, OctaveSolver
 from kincompile.emitters.planned_solve import schedule_determinants
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.solve_statements import factorization
-from kincompile.emitters.solver_tables import solver_tables
+from kincompile.emitters.solver_tables import NUMBERS, solver_tables
 from kincompile.emitters.statements import Statements
 from kincompile.emitters.templates import fill
 from kincompile.errors import InputError, UnsupportedError
 from kincompile.ir.elimination import plan_solve, sizes_of
+from kincompile.solver.reader import start
+from kincompile.solver.vocabulary import STATUSES
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping
 
     from kincompile.emitters.evaluators import Listing
     from kincompile.emitters.planned_solve import BlockCall
@@ -37,15 +41,6 @@ WRITE = Statements("%", "{}", "{}({})", "{}({}, {})", "[c, -s; s, c]", first=1, 
 LONGEST_NAME = 63
 """Longest name; MATLAB truncates longer ones."""
 
-CRITERIA = (
-    "ASTRAY", "AS_NEAR", "BEND", "CONSTANT", "FAR", "FARTHEST", "FOLDED", "LARGEST_ANGLE",
-    "LONGEST_P", "MAX_CORRECTIONS", "MAX_ITERATIONS", "MIRRORED", "MIRROR_STEP", "MOST_MIRRORED",
-    "MOST_TURNED", "NEAR_ANGLE", "NEAR_PART", "NUDGE", "RESIDUAL_FACTOR", "RESTARTS", "ROUNDING",
-    "SAME_POSITION", "SETTLED", "SHORTEST_STEP", "SMALL_PART", "STEEP", "SUFFICIENT", "THROWN",
-    "TOLERANCE", "WILD",
-)  # fmt: skip
-"""The numbers of `criteria` that a start is judged by."""
-
 KEYWORDS = (
     "break", "case", "catch", "classdef", "continue", "do", "else", "elseif", "end", "endif",
     "endfor", "endfunction", "endwhile", "endswitch", "for", "function", "global", "if",
@@ -55,11 +50,10 @@ KEYWORDS = (
 """Words of MATLAB and of Octave."""
 
 CALLED = (
-    *NAMES.values(), "abs", "all", "any", "circshift", "deal", "det", "diag", "double", "either",
-    "eps", "error", "eye", "false", "find", "in_reals", "Inf", "isempty", "isfinite", "isnan",
-    "isreal", "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "num2cell", "numel",
-    "ode45", "odeset", "ones", "pi", "pinv", "polyval", "rank", "rcond", "round", "sign", "single",
-    "size", "sortrows", "sqrt", "sum", "svd", "true", "zeros",
+    *NAMES.values(), "abs", "accumarray", "all", "any", "det", "diag", "double", "either", "error",
+    "eye", "false", "find", "floor", "in_reals", "Inf", "isempty", "isfinite", "isnan", "isreal",
+    "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "numel", "ode45", "odeset", "ones",
+    "pi", "pinv", "polyval", "qr", "single", "size", "sqrt", "sum", "svd", "true", "zeros",
 )  # fmt: skip
 """Functions that the files call; a script of such a name would be called in their place."""
 
@@ -161,27 +155,21 @@ def _literal(text: str) -> str:
     return "'" + text.replace("'", "''") + "' ..."
 
 
-def _numbers(places: Iterable[int]) -> str:
-    """Return numbers of rows or columns, which count from 1."""
-    return f"[{', '.join(str(k + 1) for k in places)}]"
+def _determinants(code: InlineProgram) -> tuple[list[str], int]:
+    """Return the statements that take Phi_q to the determinants that tell branches apart.
 
-
-def _covers(covers: Sequence[Sequence[int]]) -> str:
-    """Return the places of the Euler parameters of bodies in space, a column for each body."""
-    return "; ".join(" ".join(str(k + 1) for k in row) for row in zip(*covers, strict=True))
-
-
-def _determinants(code: InlineProgram) -> list[str]:
-    """Return the statements that take Phi_q to the determinants that tell branches apart."""
+    And how many these are.
+    """
     plan = None if code.program.redundant else plan_solve(code)
     if plan is None:
-        return []  # nothing but the independent rows has a determinant
+        return [], 0  # nothing but the independent rows has a determinant
     table = NameTable((*RESERVED, "determinants"))
     # Names of bodies and constraints could be too long for MATLAB.
     names = {node: table.take(f"a_{row + 1}_{column + 1}") for row, column, node in plan.entries}
     listing = schedule_determinants(plan, names, table)
     printer = Printer(DIALECT, plan.nodes, names, code.program.name)
-    return factorization(WRITE, code, listing, printer, _block_call)
+    lines = factorization(WRITE, code, listing, printer, _block_call)
+    return lines, len(plan.determinants)
 
 
 def _block_call(step: BlockCall, printer: Printer) -> list[str]:
@@ -236,23 +224,40 @@ def _criteria(names: Iterable[str]) -> dict[str, str]:
 
 
 def _assembly(code: InlineProgram) -> str:
-    """Return the function that finds the position at the first time."""
-    program = code.program
-    tables, columns = solver_tables(program), [body.columns for body in program.bodies]
-    angles, free = (
-        [k for k, turns in enumerate(tables[name]) if turns] for name in ("ANGULAR", "MAY_TURN")
-    )
-    determinants = "\n".join(_determinants(code))
+    """Return the function that finds the position at the first time, by the printed start."""
+    program, (determinants, blocks) = code.program, _determinants(code)
+    n, m = len(program.coordinates), len(program.equations)
+    sizes = {
+        "N": n, "M": m, "NONZEROS": len(code.pattern()), "BLOCKS": blocks,
+        "TALL": m + n, "WIDE": n + 1,
+    }  # fmt: skip
     data = {
         "name": program.name,
         "fingerprint": program.fingerprint,
-        "n": len(program.coordinates),
-        "angles": _numbers(angles),
-        "may_turn": _numbers(free),
-        "m": len(program.equations),
-        "covers": _covers(criteria.covers(columns)),
-        "determinants": determinants,
-        "functions": _called_in(determinants),
-        **{name: repr(getattr(criteria, name)) for name in CRITERIA},
+        "n": n,
+        "m": m,
+        "tables": "\n".join(_tables(code)),
+        "blocks": blocks,
+        "determinants": "\n".join(determinants),
+        "functions": _called_in("\n".join(determinants)),
+        "solver": OctaveSolver(start(), {**sizes, **STATUSES, **NUMBERS}).text(),
+        "CONVERGED": STATUSES["CONVERGED"],
+        **_criteria(("CONSTANT", "MAX_ITERATIONS", "SMALL_PART", "TOLERANCE")),
     }
     return fill("octave/assemble.m.jinja", data).rstrip("\n") + "\n"
+
+
+def _tables(code: InlineProgram) -> Iterable[str]:
+    """Yield the lines that give the start its tables, as columns; places count from 1."""
+    pattern = [f"{row + 1} {column + 1}" for row, column in code.pattern()]
+    for name, values in solver_tables(code.program).items():
+        first = name in PLACES
+        yield from _table(name, items(x + first if first else x for x in values))
+    yield from _table("PATTERN", pattern)
+
+
+def _table(name: str, rows: Iterable[str]) -> Iterable[str]:
+    """Yield the lines of a table with rows."""
+    yield f"s.{name} = ["
+    yield from (f"    {line.replace(',', ';')}" for line in wrapped(rows))
+    yield "];"
