@@ -85,8 +85,11 @@ class Entries:
             case Declare(variable, value) if not variable.type.dims and self.reads(value):
                 self.columns.add(variable)
                 return True
-            case Assign(Index() as target, _, value):
-                return self.is_column(target) and self.reads(target) and self.reads(value)
+            case Assign(Index() as target, operation, value):
+                places = [x for x in self.places(target) or () if x in self.columns]
+                # added to a place that may come again; or put to a row and column that does not
+                is_known = not places or (len(places), bool(operation)) in ((1, True), (2, False))
+                return bool(self.places(target)) and is_known and self.reads(value)
             case Assign(Name(variable), _, value) if variable in self.columns:
                 return self.reads(value)
             case Assign(Name() | Field() as target, operation, value):
@@ -124,6 +127,9 @@ def entries_of(node: For, functions: tuple[str, ...]) -> Entries | None:
     if not all(map(entries.takes, node.body)):
         return None
     written = [x for x in nodes_in(node.body) if isinstance(x, Assign)]
+    ends = any(isinstance(x, Return) for x in nodes_in(node.body))
+    if ends and any(isinstance(x.target, Field | Index) for x in written):
+        return None  # what passes after the end do not write
     for item in written:
         if isinstance(item.target, Index):
             array = indices_of(item.target)[0]

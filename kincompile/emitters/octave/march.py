@@ -31,6 +31,7 @@ from kincompile.solver.nodes import (
     Return,
     Unary,
     While,
+    variables_in,
 )  # fmt: skip
 from kincompile.solver.vocabulary import TABLES, WORDS
 
@@ -194,7 +195,9 @@ class OctaveSolver(OneLane):
                     return [f"if {self.opposite(condition)}", *_indented(second), "end"]
                 lines = [f"if {self.expression(condition)}", *_indented(first)]
                 return [*lines, *(["else", *_indented(second)] if second else []), "end"]
-            case Binary("and" | "or" as sign, left, right) if self.is_stated(right):
+            case Binary("and" | "or" as sign, left, right) if self.is_stated(
+                right
+            ) and into not in {x.name for x in variables_in(right)}:
                 lines = self.set(into, left)
                 head = f"if {self.negation * (sign == 'or')}{into}"
                 return [*lines, head, *_indented(self.after(lambda: self.set(into, right))), "end"]
