@@ -74,16 +74,15 @@ def followed(inputs: Inputs, begin: Begin, p: Array) -> Motion:
     if not begin.is_assembled:
         return follow(own)[0]
     motion, _ = follow(replace(own, guess=begin.q))
-    equations, q = begin.equations, motion.q[0]
+    equations, q = begin.equations, motion.states[0, :, 0]
     is_there = motion.status[0] == Status.CONVERGED
     if not is_there or not (is_elsewhere(equations, q, begin.q) or leaves(begin, own, q)):
         return motion
     led, crosses = lead(inputs, equations, begin.q, p)
     motion, _ = follow(own if led is None else replace(own, guess=led))
     is_there = motion.status[0] == Status.CONVERGED
-    if led is None and is_there and (crosses or leaves(begin, own, motion.q[0])):
-        for values in (motion.q, motion.q_dot, motion.q_ddot):
-            values[:] = np.nan
+    if led is None and is_there and (crosses or leaves(begin, own, motion.states[0, :, 0])):
+        motion.states[:] = np.nan
         motion.status[:] = Status.NOT_REACHED
         motion.status[0] = Status.NOT_CONVERGED
     return motion
@@ -159,7 +158,7 @@ class Sets:
         folded = np.abs(shown) <= FOLDED * np.abs(here)  # then nothing shows a branch
         return np.asarray(((np.sign(here) != np.sign(shown)) & ~folded).any(axis=0))
 
-    def assembled(self, known: NDArray[np.intc] | None = None) -> Assembled:
+    def assembled(self, known: NDArray[np.int64] | None = None) -> Assembled:
         """Assemble all at the first time.
 
         Known may be with which `Status` (B,) Newton's own steps from the first position end in

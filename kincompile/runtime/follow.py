@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from kincompile.names import listed
 from kincompile.runtime.engine.dense import LARGEST_CAREFUL, Dense
 from kincompile.runtime.engine.scales import Point
 from kincompile.runtime.engine.sparse import Sparse
-from kincompile.runtime.grid import CORRECTIONS_ON_GRID, GridResult, solve_grid
+from kincompile.runtime.grid import CORRECTIONS_ON_GRID, solve_grid
 from kincompile.runtime.march import March, Outcome, State
 from kincompile.runtime.problem import problem
 from kincompile.runtime.singular.events import (
@@ -40,20 +40,25 @@ if TYPE_CHECKING:
     Progress: TypeAlias = Callable[[int, int], object]
 
 
+def _by_points() -> dict[str, int]:
+    return {"coarse": 0, "marched": 0}
+
+
 @dataclass(slots=True, eq=False)
 class Motion:
-    """The arrays of a solution while they are being filled, N points and n coordinates."""
+    """A motion while it is being filled, N points and n coordinates; or B, which is the last axis.
 
-    # q, q_dot, q_ddot (N, n): the motion; NaN where nothing was found, and unknown after the last
-    # point reached
-    q: Array
-    q_dot: Array
-    q_ddot: Array
-    # status, residual, iterations (N,): what became of each point
+    What is said beside the arrays is said of one.
+    """
+
+    # (3, n, N) or (3, n, N, B): q, q_dot and q_ddot; NaN where nothing was found, and unknown after
+    # the last point reached
+    states: Array
+    # status, residual, iterations (N,) or (N, B): what became of each point
     status: NDArray[np.int64]
     residual: Array
     iterations: NDArray[np.int64]
-    statistics: dict[str, int]  # how many points were found in which way
+    statistics: dict[str, int] = field(default_factory=_by_points)  # points by how they were found
     # events, passed: what happened on the way, and those of it that the motion went through
     events: list[Event] = field(default_factory=list)
     passed: list[Event] = field(default_factory=list)
@@ -64,44 +69,64 @@ class Motion:
     is_folded: bool = False  # whether the guess shows no branch
 
     @classmethod
-    def over(cls, inputs: Inputs) -> Motion:
-        """Make the arrays for a time grid, with nothing reached."""
-        points = inputs.t.size
-        if inputs.code.blocks:
-            q, q_dot, q_ddot = np.empty((3, points, inputs.guess.size))
+    def over(cls, inputs: Inputs, *count: int) -> Motion:
+        """Make the arrays for a time grid, or for so many motions over it, with nothing reached."""
+        n, shape = inputs.guess.size, (inputs.t.size, *count)
+        if count or inputs.code.blocks:
+            states = np.empty((3, shape[0], n, *count)).swapaxes(1, 2)
         else:  # each coordinate contiguous in memory, as the code of a grid wants it
-            q, q_dot, q_ddot = np.empty((3, inputs.guess.size, points)).transpose(0, 2, 1)
-        return cls(
-            q,
-            q_dot,
-            q_ddot,
-            np.full(points, int(Status.NOT_REACHED)),
-            np.full(points, np.nan),
-            np.zeros(points, dtype=np.int64),
-            {"coarse": 0, "marched": 0},
-        )
+            states = np.empty((3, n, *shape))
+        status = np.full(shape, int(Status.NOT_REACHED))
+        return cls(states, status, np.full(shape, np.nan), np.zeros(shape, dtype=np.int64))
 
-    def forget(self, index: int) -> None:
-        """Clear the results of a grid after the last point reached."""
-        for values in (self.q, self.q_dot, self.q_ddot, self.residual):
-            values[index:] = np.nan
-        self.iterations[index:] = 0
+    @property
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """All that there is an entry of for each point, and of each motion."""
+        return self.states, self.status, self.residual, self.iterations
+
+    def of(self, which: Any) -> Motion:
+        """Return one of the motions, or some of them; of a number or a slice in the same arrays."""
+        states, status, residual, iterations = (values[..., which] for values in self.arrays)
+        return Motion(states, status, residual, iterations)
+
+    def fill(self, which: Any, motion: Motion) -> None:
+        """Fill in one of the motions, or some, that were followed by themselves."""
+        for values, own in zip(self.arrays, motion.arrays, strict=True):
+            values[..., which] = own
+
+    def forget(self, *which: Any) -> None:
+        """Take back what was written down at some times, of some of the motions."""
+        self.states[..., *which] = self.residual[which] = np.nan
+        self.status[which], self.iterations[which] = Status.NOT_REACHED, 0
 
     def put(self, index: int, outcome: Outcome) -> None:
         """Write down what became of a point."""
         self.status[index] = outcome.status
         self.iterations[index] = outcome.iterations
-        self.q[index] = self.q_dot[index] = self.q_ddot[index] = np.nan
-        self.residual[index] = np.nan
+        self.states[..., index] = self.residual[index] = np.nan
         if outcome.position is not None:
-            self.q[index] = outcome.position.q
+            self.states[0, :, index] = outcome.position.q
         if (point := outcome.position or (None if outcome.jumps else outcome.nearest)) is not None:
             self.residual[index] = np.max(np.abs(point.Phi))
         if outcome.status is Status.CONVERGED and outcome.state is not None:
-            self.q_dot[index] = outcome.state.q_dot
-            self.q_ddot[index] = outcome.state.q_ddot
+            self.states[1:, :, index] = outcome.state.q_dot, outcome.state.q_ddot
             if outcome.state.sensitivity > TOO_NEAR:
                 self.near.append(index)
+
+    def march_compiled(
+        self, inputs: Inputs, march: March, guess: Array, sets: Array | None = None
+    ) -> bool:
+        """Let a compiled module follow it from a guess, or motions with sets of parameters (B, k).
+
+        Their guess is one of all, (n,), or one of each, (n, B). Says whether all went well.
+        """
+        run, residual = inputs.code.march, np.empty(self.residual.shape)
+        status, iterations = np.empty((2, *residual.shape), dtype=np.intc)
+        assert run is not None
+        found = self.states, residual, status, iterations
+        run(inputs, np.ascontiguousarray(guess), *march.scales, sets, *found)
+        self.residual[:], self.status[:], self.iterations[:] = residual, status, iterations
+        return not status.any()
 
 
 def follow(
@@ -169,19 +194,16 @@ class _Way:
 
         Where anything did not, the careful march finds out what it is, from the first time on.
         """
-        motion, inputs, march = self._motion, self._inputs, self._inputs.code.march
-        if march is None or outcome.status is not Status.CONVERGED or outcome.position is None:
+        motion, inputs, point = self._motion, self._inputs, outcome.position
+        if inputs.code.march is None or outcome.status is not Status.CONVERGED or point is None:
             return False
-        states = motion.q.T, motion.q_dot.T, motion.q_ddot.T
-        status, iterations = np.empty((2, inputs.t.size), dtype=np.intc)
-        start, scales = np.ascontiguousarray(outcome.position.q), self._march.scales
-        reached = march(inputs, start, *scales, states, motion.residual, status, iterations)
+        is_whole = motion.march_compiled(inputs, self._march, point.q)
+        if not is_whole:
+            motion.forget(slice(1, None))
         motion.put(0, outcome)
-        if reached < inputs.t.size:
-            return False
-        motion.status[1:], motion.iterations[1:] = status[1:], iterations[1:]
-        motion.statistics["compiled"] = inputs.t.size
-        return True
+        if is_whole:
+            motion.statistics["compiled"] = inputs.t.size
+        return is_whole
 
     def run(self, outcome: Outcome) -> Outcome:
         """Follow the motion as far as it goes."""
@@ -233,7 +255,7 @@ class _Way:
         index = self._index - 2
         if index < 0:
             return None
-        q = np.ascontiguousarray(self._motion.q[index])
+        q = np.ascontiguousarray(self._motion.states[0, :, index])
         state = self._state(q, float(self._times[index])).state
         return None if state is None else locate(self._march, state, t)
 
@@ -258,7 +280,7 @@ class _Way:
 
     def end(self) -> None:
         """Clear the results of a grid after the last point reached."""
-        self._motion.forget(self._index)
+        self._motion.forget(slice(self._index, None))
         self._count_pivoted()
 
     def _count_pivoted(self) -> None:
@@ -346,15 +368,14 @@ class _Way:
         if not self._inputs.on_grid or outcome.status is not Status.CONVERGED or first is None:
             return trusted
         if first.t == self._times[index]:
-            arrays = motion.q, motion.q_dot, motion.q_ddot, motion.residual
-            known = [values[index].copy() for values in arrays]
-            q, q_dot, q_ddot, residual = (values[index:].T for values in arrays)
-            result = GridResult(q, q_dot, q_ddot, residual, trusted[index:])
+            arrays = motion.states, motion.residual
+            known = [values[..., index].copy() for values in arrays]
+            found = (*(values[..., index:] for values in arrays), trusted[index:])
             times = self._inputs.t[index:]
-            motion.statistics["coarse"] += solve_grid(self._march, times, first, result)
+            motion.statistics["coarse"] += solve_grid(self._march, times, first, *found)
             # The first point was found with care; the grid's numbers never take its place.
             for values, value in zip(arrays, known, strict=True):
-                values[index] = value
+                values[..., index] = value
             motion.iterations[index + 1 :] = CORRECTIONS_ON_GRID
         return trusted
 
@@ -367,7 +388,7 @@ class _Way:
         motion, index = self._motion, self._index
         if motion.status[index - 1] == Status.CONVERGED and motion.statistics["marched"] == 0:
             return True
-        away = self._march.equations.extent(motion.q[index] - state.point.q)
+        away = self._march.equations.extent(motion.states[0, :, index] - state.point.q)
         return bool(away <= SMALL_ERROR)
 
     def _take_up(self, count: int) -> Outcome:
@@ -377,10 +398,11 @@ class _Way:
         motion.status[self._index : stop] = Status.CONVERGED
         self._index = stop
         if stop < len(self._times):
-            return self._state(np.ascontiguousarray(motion.q[last]), float(self._times[last]))
-        nothing = np.empty(0)
-        point = Point(motion.q[last], float(self._times[last]), nothing, nothing)
-        state = State(point.t, point, motion.q_dot[last], motion.q_ddot[last], nothing)
+            q = np.ascontiguousarray(motion.states[0, :, last])
+            return self._state(q, float(self._times[last]))
+        nothing, (q, q_dot, q_ddot) = np.empty(0), motion.states[..., last]
+        point = Point(q, float(self._times[last]), nothing, nothing)
+        state = State(point.t, point, q_dot, q_ddot, nothing)
         return Outcome(Status.CONVERGED, 0, state, point)
 
     def _state(self, q: NDArray[np.float64], t: float) -> Outcome:

@@ -73,23 +73,19 @@ HERMITE = np.array([
 h^2 q_ddot at the left end, then at the right end."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class GridResult:
-    """What was found on a grid."""
+def solve_grid(
+    march: March,
+    times: Array,
+    first: State,
+    states: Array,
+    residual: Array,
+    good: NDArray[np.bool_],
+) -> int:
+    """Solve as much of a grid of times (N,) as can be trusted, into arrays.
 
-    # q, q_dot, q_ddot (n, N): the motion; each coordinate is a row
-    q: Array
-    q_dot: Array
-    q_ddot: Array
-    # (N,): largest absolute value of Phi at the last position but one, a rounding error away
-    residual: Array
-    good: NDArray[np.bool_]  # (N,), bool: which points can be trusted
-
-
-def solve_grid(march: March, times: Array, first: State, result: GridResult) -> int:
-    """Solve as much of a grid of times (N,) as can be trusted, into the arrays of `result`.
-
-    `first` is the point at its start. Returns the number of points in the coarse march.
+    `first` is the point at its start. Filled are `states` (3, n, N) with position, velocity and
+    acceleration, the largest absolute values of Phi (N,) at the last positions but one, a rounding
+    error away, and which points are good (N,). Returns the number of points in the coarse march.
     """
     equations, code = march.equations, march.equations.code
     assert code.lanes is not None
@@ -105,14 +101,16 @@ def solve_grid(march: March, times: Array, first: State, result: GridResult) -> 
     node = _Node(0, q, q_dot, q_ddot, determinants)
     nodes = _coarse_march(floats, node, times, (1 / reference).tolist())
     reached = nodes[-1].index + 1
-    _interpolate(nodes, times[:reached], result.q)
+    _interpolate(nodes, times[:reached], states[0])
     signed = np.array([node.determinants for node in nodes])
     smallest = np.copysign(SMALLEST_DETERMINANT * np.max(np.abs(signed), axis=0), signed[0])
     batch = March(equations, Planned(code, equations.p), march.tolerance)
     parts = max(1, round(reached * reference.size / BLOCK))
     edges = np.linspace(0, reached, parts + 1).astype(int).tolist()
     for start, stop in itertools.pairwise(edges):
-        _solve_block(batch, times[start:stop], result, slice(start, stop), smallest)
+        part = slice(start, stop)
+        found = states[..., part], residual[part], good[part]
+        _solve_block(batch, times[part], *found, smallest)
     return len(nodes)
 
 
@@ -209,14 +207,21 @@ def _interpolate(nodes: list[_Node], times: Array, q: Array) -> None:
     q[:, nodes[-1].index] = nodes[-1].q
 
 
-def _solve_block(march: March, t: Array, result: GridResult, block: slice, smallest: Array) -> None:
+def _solve_block(
+    march: March,
+    t: Array,
+    states: Array,
+    residual: Array,
+    trusted: NDArray[np.bool_],
+    smallest: Array,
+) -> None:
     """Correct a block of interpolated positions twice, and solve for velocity and acceleration."""
-    engine, q_dot, q_ddot = march.engine, result.q_dot[:, block], result.q_ddot[:, block]
+    engine, (q, q_dot, q_ddot) = march.engine, states
     assert isinstance(engine, Planned)
-    found = march.correct_together(result.q[:, block], t, CORRECTIONS_ON_GRID, LARGEST_DISPLACEMENT)
+    found = march.correct_together(q, t, CORRECTIONS_ON_GRID, LARGEST_DISPLACEMENT)
     point, good = found.point, found.good
-    result.residual[block] = largest(point.Phi, t.size)
+    residual[:] = largest(point.Phi, t.size)
     rates = engine.rates(point, None, (q_dot, q_ddot))
     for values, least in zip(point.factors[1], smallest, strict=True):
         good = good & (values / least > 1)
-    result.good[block] = good & engine.meet(march.equations, point, rates)
+    trusted[:] = good & engine.meet(march.equations, point, rates)

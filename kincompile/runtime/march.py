@@ -403,18 +403,6 @@ def chosen(which: Any, one: State, other: State) -> State:
     return batch([one, other], lambda parts: np.where(which, *parts))
 
 
-def put(state: State, place: int, alone: State) -> None:
-    """Put a batch of one in a place of another one."""
-
-    def put_each(parts: Sequence[Array]) -> Array:
-        here, own = parts
-        if here.flags.writeable:  # the time, and what all have in common, is not put anywhere
-            here[..., place] = own[..., 0]
-        return here
-
-    batch([state, alone], put_each)
-
-
 Checks = tuple[tuple[Any, Status], ...]
 """What must be true, of one point or of each of a batch, and the status where it is not."""
 

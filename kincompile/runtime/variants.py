@@ -22,8 +22,7 @@ from kincompile.criteria import (
 from kincompile.errors import BranchSwitchWarning, memory_for
 from kincompile.runtime.assembled import Begin, Sets, first_position, followed
 from kincompile.runtime.attempts import safeguarded
-from kincompile.runtime.engine.planned import Planned
-from kincompile.runtime.follow import follow
+from kincompile.runtime.follow import Motion, follow
 from kincompile.runtime.march import (
     March,
     Outcome,
@@ -32,13 +31,13 @@ from kincompile.runtime.march import (
     chosen,
     joined,
     largest,
-    put,
     some_of,
 )
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.singular.events import locate, status_after
 from kincompile.runtime.start import give_up, start
 from kincompile.runtime.status import Status
+from kincompile.runtime.verdict import fields_of
 from kincompile.tables import counted
 
 if TYPE_CHECKING:
@@ -47,13 +46,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Array
-    from kincompile.runtime.follow import Motion, Progress
+    from kincompile.runtime.follow import Progress
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.singular.events import Event
 
     Mask = NDArray[np.bool_]
     Places = NDArray[np.intp]
-    Statuses = NDArray[np.intc]
+    Statuses = NDArray[np.int64]
     _Lost = tuple[int, int, March, State, Outcome]
     """A variant, its next time, its march, where it came from, and how far it got."""
 
@@ -67,42 +66,12 @@ LEFT = (
 """What is said of a variant that is not on the branch of the first set."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Arrays:
-    """The arrays of the solution: motion (3, N, n, B) for q, q_dot, q_ddot, the others (N, B).
-
-    The variants are the last axis, as in the code that fills them.
-    """
-
-    motion: Array
-    status: NDArray[np.int64]
-    residual: Array
-    iterations: NDArray[np.int64]
-
-    @classmethod
-    def over(cls, inputs: Inputs, count: int) -> _Arrays:
-        """Make the arrays for so many variants, with nothing reached."""
-        points, n = inputs.t.size, inputs.guess.size
-        what = f"{count:,} variants at {points:,} times have {24e-9 * points * n * count:,.1f} GB"
-        with memory_for(what, "give fewer at a time; kc.sweep takes them in chunks"):
-            return cls(
-                np.empty((3, points, n, count)),
-                np.full((points, count), int(Status.NOT_REACHED)),
-                np.full((points, count), np.nan),
-                np.zeros((points, count), dtype=np.int64),
-            )
-
-    def clear(self, places: Places) -> None:
-        """Take back what was written down for some variants."""
-        self.motion[..., places] = self.residual[:, places] = np.nan
-        self.status[:, places], self.iterations[:, places] = Status.NOT_REACHED, 0
-
-    def put(self, motion: Motion, variant: int) -> None:
-        """Fill in the motion of one variant, which was followed by itself."""
-        self.motion[..., variant] = motion.q, motion.q_dot, motion.q_ddot
-        self.status[:, variant] = motion.status
-        self.residual[:, variant] = motion.residual
-        self.iterations[:, variant] = motion.iterations
+def _over(inputs: Inputs, count: int) -> Motion:
+    """Make the arrays for so many variants."""
+    points, n = inputs.t.size, inputs.guess.size
+    what = f"{count:,} variants at {points:,} times have {24e-9 * points * n * count:,.1f} GB"
+    with memory_for(what, "give fewer at a time; kc.sweep takes them in chunks"):
+        return Motion.over(inputs, count)
 
 
 def solve_variants(inputs: Inputs, sets: Array, progress: Progress | None) -> Solution:
@@ -111,29 +80,30 @@ def solve_variants(inputs: Inputs, sets: Array, progress: Progress | None) -> So
     `progress` is called as ``progress(done, total)`` after each chunk of variants. The arrays of
     the solution have shape (B, N, n), and there is a status per variant and point.
     """
-    count, arrays = len(sets), _Arrays.over(inputs, len(sets))
+    count, motions = len(sets), _over(inputs, len(sets))
     inputs, begin = first_position(inputs)
     for first in range(0, count, CHUNK):
         chunk = slice(first, min(first + CHUNK, count))
-        _Chunk(inputs, begin, sets[chunk], arrays, chunk).solve()
+        _Chunk(inputs, begin, sets[chunk], motions.of(chunk)).solve()
         if progress:
             progress(chunk.stop, count)
     if inputs.smooth:
-        _warn_of(inputs, _go_through(inputs, sets, arrays))
-    return _solution(inputs, sets, arrays)
+        _warn_of(inputs, _go_through(inputs, sets, motions))
+    return _solution(inputs, motions)
 
 
-def _go_through(inputs: Inputs, sets: Array, arrays: _Arrays) -> dict[int, Event]:
+def _go_through(inputs: Inputs, sets: Array, motions: Motion) -> dict[int, Event]:
     """Let variants that end at a bifurcation go alone, on past it, each from its own position.
 
     Returns the first bifurcation that each went through.
     """
-    ends = (arrays.status == Status.SINGULAR).any(axis=0) & (arrays.status[0] == Status.CONVERGED)
+    status = motions.status
+    ends = (status == Status.SINGULAR).any(axis=0) & (status[0] == Status.CONVERGED)
     passed: dict[int, Event] = {}
     for variant in np.flatnonzero(ends).tolist():
-        guess = np.ascontiguousarray(arrays.motion[0, 0, :, variant])
+        guess = np.ascontiguousarray(motions.states[0, :, 0, variant])
         motion, _ = follow(replace(inputs, p=sets[variant], guess=guess))
-        arrays.put(motion, variant)
+        motions.fill(variant, motion)
         if motion.passed:
             passed[variant] = motion.passed[0]
     return passed
@@ -153,44 +123,42 @@ def _warn_of(inputs: Inputs, passed: Mapping[int, Event]) -> None:
 
 def solve_in_turn(inputs: Inputs, sets: Array, progress: Progress | None) -> Solution:
     """Solve variants of a module that has no lanes, one after the other."""
-    arrays = _Arrays.over(inputs, len(sets))
+    motions = _over(inputs, len(sets))
     inputs, begin = first_position(inputs)
     passed: dict[int, Event] = {}
     for variant, p in enumerate(sets):
         motion = followed(inputs, begin, p)
-        arrays.put(motion, variant)
+        motions.fill(variant, motion)
         if motion.passed:
             passed[variant] = motion.passed[0]
         if progress:
             progress(variant + 1, len(sets))
     _warn_of(inputs, passed)
-    return _solution(inputs, sets, arrays)
+    return _solution(inputs, motions)
 
 
 class _Chunk:
     """Variants that are solved together, and alone for the steps that are out of the ordinary."""
 
-    def __init__(
-        self, inputs: Inputs, begin: Begin, sets: Array, arrays: _Arrays, own: slice | Places
-    ) -> None:
+    def __init__(self, inputs: Inputs, begin: Begin, sets: Array, motions: Motion) -> None:
         self._inputs, self._begin, self._p = inputs, begin, sets
-        self._sets, self._arrays, self._own = Sets(inputs, begin, sets), arrays, own
-        self._places = np.arange(arrays.status.shape[1])[own]  # where variants are in the arrays
+        self._sets, self._motions = Sets(inputs, begin, sets), motions
         self._times: list[float] = inputs.t.tolist()
 
     def solve(self) -> None:
         """Solve: compiled, where the module can, and with care what fails."""
-        if self._inputs.code.march_variants is None:
+        if self._inputs.code.march is None:
             self._follow(self._assembled())
             return
         everyone = np.arange(len(self._p))
         status, q = self._marched(everyone, self._begin.q)
         elsewhere = (status[0] != Status.CONVERGED) | self._sets.strays(everyone, q)
-        self._go_on(status, everyone, ~elsewhere)
+        self._go_on(everyone[~elsewhere])
         if elsewhere.any():
-            own = self._inputs, self._begin, self._p[elsewhere], self._arrays
-            rest = _Chunk(*own, self._places[elsewhere])
+            motions = Motion.over(self._inputs, int(elsewhere.sum()))
+            rest = _Chunk(self._inputs, self._begin, self._p[elsewhere], motions)
             rest._solve_from_own_places(status[0, elsewhere])
+            self._motions.fill(elsewhere, motions)
 
     def _solve_from_own_places(self, status: Statuses) -> None:
         """Solve compiled what is not on the branch from the first position, but from its own."""
@@ -199,7 +167,7 @@ class _Chunk:
             return
         found, _ = self._marched(lanes.variants, lanes.state.point.q)
         good = found[0] == Status.CONVERGED
-        self._go_on(found, lanes.variants, good)
+        self._go_on(lanes.variants[good])
         if not good.all():
             lanes = lanes.some(~good)
             first = _Lanes(lanes.variants, lanes.index - 1, lanes.state)
@@ -211,21 +179,12 @@ class _Chunk:
 
         Returns what became of them, `Status` (N, V), and their first positions (n, V).
         """
-        march, arrays, places = self._inputs.code.march_variants, self._arrays, self._places
-        assert march is not None
-        is_all = variants.size == places.size and isinstance(self._own, slice)
-        own = self._own if is_all else places[variants]
-        residual = np.empty((self._inputs.t.size, variants.size))
-        status, iterations = np.empty((2, *residual.shape), dtype=np.intc)
-        shape = (*arrays.motion.shape[:-1], variants.size)
-        motion = arrays.motion[..., own] if is_all else np.empty(shape)
-        scales, p = self._sets.march(variants).scales, self._p[variants]
-        march(self._inputs, guess, *scales, p, motion, residual, status, iterations)
+        is_all = variants.size == len(self._p)
+        motions = self._motions if is_all else Motion.over(self._inputs, variants.size)
+        motions.march_compiled(self._inputs, self._sets.march(variants), guess, self._p[variants])
         if not is_all:
-            arrays.motion[..., own] = motion
-        arrays.residual[:, own], arrays.status[:, own] = residual, status
-        arrays.iterations[:, own] = iterations
-        return status, motion[0, 0]
+            self._motions.fill(variants, motions)
+        return motions.status, motions.states[0, :, 0]
 
     def _follow(self, lanes: _Lanes) -> None:
         """Go through the grid with variants that are assembled."""
@@ -236,35 +195,46 @@ class _Chunk:
             here, lanes = lanes, _Lanes(lanes.variants, lanes.index + 1, following)
             if not good.all():
                 lost.append(here.some(~good))
-                self._arrays.motion[:, k:, :, self._places[lost[-1].variants]] = np.nan
+                self._motions.states[..., k:, lost[-1].variants] = np.nan
                 lanes = lanes.some(good)
                 march = self._sets.march(lanes.variants)
                 if not lanes.variants.size:
                     break
-        self._finish(lost)
+        if lost:
+            self._finish(_joined(lost))
 
-    def _go_on(self, status: Statuses, variants: Places, which: Mask) -> None:
-        """Take some variants on from where the compiled march has left them, by `Status` (N, V)."""
+    def _go_on(self, variants: Places) -> None:
+        """Take those variants on that the compiled march has left on their way."""
+        status = self._motions.status[:, variants]
         # What ends at a lock-up is no failure of that march.
-        failed = status.any(axis=0) & ~(status == Status.LOCK_UP).any(axis=0) & which
-        if not failed.any():
-            return
-        variants, index = variants[failed], (status[:, failed] != 0).argmax(axis=0)
-        q = np.ascontiguousarray(self._arrays.motion[0, index - 1, :, self._places[variants]].T)
+        failed = status.any(axis=0) & ~(status == Status.LOCK_UP).any(axis=0)
+        if failed.any():
+            self._finish(self._known(variants[failed], (status[:, failed] != 0).argmax(axis=0)))
+
+    def _known(self, variants: Places, index: Places) -> _Lanes:
+        """Return variants on the way to times from the points before these."""
+        found = self._motions.states[:, :, index - 1, variants]
+        q, q_dot, q_ddot = (np.ascontiguousarray(values) for values in found)
         march = self._sets.march(variants)
         state, _ = march.complete(march.engine.evaluate(q, np.array(self._times)[index - 1]))
-        self._finish([_Lanes(variants, index, state)])
+        # These points are good, also where the elimination in a fixed order loses digits.
+        near = np.fmin(state.sensitivity, TOO_NEAR)
+        state = replace(state, q_dot=q_dot, q_ddot=q_ddot, sensitivity=near)
+        return _Lanes(variants, index, state)
 
-    def _finish(self, lost: list[_Lanes]) -> None:
+    def _finish(self, lanes: _Lanes) -> None:
         """Take variants on, each at its own pace, and alone where that leads nowhere."""
-        while lost:
-            lost = self._with_care(self._at_own_pace(_joined(lost)))
+        while lanes.variants.size:
+            stuck = self._at_own_pace(lanes)
+            on = self._with_care(stuck)
+            if not on.any():
+                break
+            lanes = self._known(stuck.variants[on], stuck.index[on] + 1)
 
     def _assembled(self, known: Statuses | None = None) -> _Lanes:
         """Assemble all variants at the first time; return those that are.
 
-        Known may be what the compiled march said of them, as for `Sets.assembled`; of those that
-        failed there it has left no numbers.
+        Known may be what the compiled march said of them, as for `Sets.assembled`.
         """
         inputs, everyone = self._inputs, np.arange(len(self._p))
         begun = self._sets.assembled(known)
@@ -272,12 +242,10 @@ class _Chunk:
         good = all_hold(begun.on_branch, checks)
         good &= state.sensitivity <= TOO_NEAR
         self._record(_Lanes(everyone, 0 * everyone, state), state, good, begun.iterations)
-        written = ~good if known is None else ~good & (known == Status.CONVERGED)
-        self._arrays.clear(self._places[written])
-        self._arrays.iterations[0, self._places[~good]] = 0
+        self._motions.forget(slice(None), ~good)
         over = ((begun.hopeless, Status.NOT_ASSEMBLED), (begun.left, Status.NOT_CONVERGED))
         for variants, status in over:
-            self._arrays.status[0, self._places[variants]] = status
+            self._motions.status[0, variants] = status
         bad = np.setdiff1d(np.flatnonzero(~good), np.union1d(begun.left, begun.hopeless))
         for variant in bad.tolist():
             own = replace(inputs, p=self._p[variant])
@@ -288,10 +256,9 @@ class _Chunk:
                 leaves = is_known and self._sets.leave(np.array([variant]), place)[0]
                 if begun.crosses[variant] or leaves:
                     outcome = Outcome(Status.NOT_CONVERGED, outcome.iterations, None)
-            alone = self._take(0, variant, outcome)
-            if alone is not None:
-                put(state, variant, alone)
-                good[variant] = True
+            good[variant] = self._take(0, variant, outcome)
+        if good[bad].any():
+            return self._known(everyone[good], 0 * everyone[good] + 1)
         return _Lanes(everyone, 0 * everyone + 1, state).some(good)
 
     def _at_own_pace(self, lanes: _Lanes) -> _Lanes:
@@ -338,12 +305,13 @@ class _Chunk:
                 march = self._sets.march(lanes.variants)
         return _joined(stuck)
 
-    def _with_care(self, lanes: _Lanes) -> list[_Lanes]:
-        """Take variants to their next times alone; return those that get there and go on."""
-        back: list[_Lanes] = []
+    def _with_care(self, lanes: _Lanes) -> Mask:
+        """Take variants to their next times alone; say which get there and go on."""
+        on = np.zeros(lanes.variants.size, dtype=bool)
         lost: list[_Lost] = []
-        for variant, index in zip(lanes.variants.tolist(), lanes.index.tolist(), strict=True):
-            q = np.ascontiguousarray(self._arrays.motion[0, index - 1, :, self._places[variant]])
+        each = zip(lanes.variants.tolist(), lanes.index.tolist(), strict=True)
+        for lane, (variant, index) in enumerate(each):
+            q = np.ascontiguousarray(self._motions.states[0, :, index - 1, variant])
             alone = self._sets.alone(variant, q)
             point = alone.equations.at(q, self._times[index - 1])
             known = Status.NOT_FINITE if point is None else alone.state(point)
@@ -354,11 +322,9 @@ class _Chunk:
             if outcome.position is None:
                 lost.append((variant, index, alone, known, outcome))
                 continue
-            state = self._take(index, variant, outcome)
-            if state is not None and index + 1 < len(self._times):
-                back.append(_Lanes(np.array([variant]), np.array([index + 1]), state))
+            on[lane] = self._take(index, variant, outcome) and index + 1 < len(self._times)
         self._give_up(lost)
-        return back
+        return on
 
     def _give_up(self, lost: Sequence[_Lost]) -> None:
         """Find out why variants do not get to a time."""
@@ -381,57 +347,31 @@ class _Chunk:
 
     def _record(self, lanes: _Lanes, state: State, good: Mask, iterations: Any) -> None:
         """Write down the variants that are good, each at its own next time."""
-        arrays, index, place = self._arrays, lanes.index[good], self._places[lanes.variants[good]]
+        motions, index, own = self._motions, lanes.index[good], lanes.variants[good]
         found = state.point.q, state.q_dot, state.q_ddot
-        together = np.array_equal(place, self._places) and (index == index[0]).all()
-        for target, values in zip(arrays.motion, found, strict=True):
+        together = own.size == len(self._p) and (index == index[0]).all()
+        for target, values in zip(motions.states, found, strict=True):
             if together:
-                target[index[0]][:, self._own] = values
+                target[:, index[0]] = values
             else:
-                target[index, :, place] = values[:, good].T
-        arrays.status[index, place] = Status.CONVERGED
-        arrays.residual[index, place] = largest(state.point.Phi, good.size)[good]
-        arrays.iterations[index, place] = iterations[good]
+                target[:, index, own] = values[:, good]
+        motions.status[index, own] = Status.CONVERGED
+        motions.residual[index, own] = largest(state.point.Phi, good.size)[good]
+        motions.iterations[index, own] = iterations[good]
 
     def _end(self, lanes: _Lanes, over: Mask, status: Status) -> None:
         """Write down variants whose motions end before their next times."""
-        places = self._places[lanes.variants[over]]
-        self._arrays.status[lanes.index[over], places] = status
-        self._arrays.motion[:, lanes.index[over], :, places] = np.nan
+        index, own = lanes.index[over], lanes.variants[over]
+        self._motions.status[index, own] = status
+        self._motions.states[..., index, own] = np.nan
 
-    def _take(self, index: int, variant: int, outcome: Outcome) -> State | None:
-        """Write down what was found for one variant alone; return the state it goes on from."""
-        found, arrays, place = outcome.state, self._arrays, self._places[variant]
-        status = outcome.status
+    def _take(self, index: int, variant: int, outcome: Outcome) -> bool:
+        """Write down what was found for one variant alone; say whether it goes on from there."""
+        found, status = outcome.state, outcome.status
         if found is not None and status is Status.CONVERGED and found.sensitivity > TOO_NEAR:
             status = Status.SINGULAR  # its rates are too uncertain to go on from
-        arrays.status[index, place] = status
-        if found is None or status is not Status.CONVERGED:
-            arrays.motion[:, index, :, place] = np.nan
-            return None
-        arrays.motion[:, index, :, place] = found.point.q, found.q_dot, found.q_ddot
-        arrays.residual[index, place] = np.max(np.abs(found.point.Phi))
-        arrays.iterations[index, place] = outcome.iterations
-        determinants = self._determinants(found, variant)[:, np.newaxis]
-        return State(
-            np.array([found.t]),
-            replace(found.point, q=found.point.q[:, np.newaxis]),
-            found.q_dot[:, np.newaxis],
-            found.q_ddot[:, np.newaxis],
-            determinants,
-            np.array([found.sensitivity]),
-            np.abs(determinants),
-        )
-
-    def _determinants(self, found: State, variant: int) -> Array:
-        """Return the determinants of the blocks of one variant.
-
-        Of redundant equations the careful march has one of all, and a batch those of the others.
-        """
-        if not self._inputs.code.redundant:
-            return found.determinants
-        engine = Planned(self._inputs.code, self._p[variant])
-        return engine.determinants(engine.evaluate(found.point.q[:, np.newaxis], found.t))[:, 0]
+        self._motions.of(variant).put(index, replace(outcome, status=status))
+        return status is Status.CONVERGED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -458,12 +398,11 @@ def _joined(parts: Sequence[_Lanes]) -> _Lanes:
     return _Lanes(variants, index, joined([part.state for part in parts]))
 
 
-def _solution(inputs: Inputs, sets: Array, arrays: _Arrays) -> Solution:
-    module = inputs.code.module
-    q, q_dot, q_ddot = arrays.motion.transpose(0, 3, 1, 2)
-    statuses = arrays.status.T
+def _solution(inputs: Inputs, motions: Motion) -> Solution:
+    name, count = inputs.code.name, motions.status.shape[1]
+    statuses = motions.status.T
     failed = np.flatnonzero((statuses != Status.CONVERGED).any(axis=1))
-    message = f"{module.NAME}: all {len(sets)} variants converged at all {inputs.t.size} points."
+    message = f"{name}: all {count} variants converged at all {inputs.t.size} points."
     if failed.size:
         variant = int(failed[0])
         index = int(np.argmax(statuses[variant] != Status.CONVERGED))
@@ -471,26 +410,7 @@ def _solution(inputs: Inputs, sets: Array, arrays: _Arrays) -> Solution:
         why = f"{status.sentence} Solve it alone to see where exactly a motion ends, and why."
         why = LEFT if status is Status.NOT_CONVERGED and index == 0 else why
         message = (
-            f"{module.NAME}: {failed.size} of {len(sets)} variants failed; the first is variant "
+            f"{name}: {failed.size} of {count} variants failed; the first is variant "
             f"{variant} at t = {inputs.t[index]:.10g} ({status.name}). {why}"
         )
-    return Solution(
-        t=inputs.t,
-        q=q,
-        q_dot=q_dot,
-        q_ddot=q_ddot,
-        status=statuses,
-        residual=arrays.residual.T,
-        iterations=arrays.iterations.T,
-        success=failed.size == 0,
-        message=message,
-        name=module.NAME,
-        coordinates=module.COORDINATES,
-        equations=module.EQUATIONS,
-        units=dict(module.UNITS),
-        parameters=dict(zip(module.PARAMETERS, sets.T, strict=True)),
-        sweep=dict(inputs.sweep),
-        statistics={"coarse": 0, "marched": 0},
-        events=[],
-        module=module,
-    )
+    return Solution(success=failed.size == 0, message=message, **fields_of(inputs, motions))

@@ -85,7 +85,7 @@ def start_of(inputs: Inputs, motion: Motion) -> str:
     may_be_open = motion.is_folded or inputs.without_guess
     if not may_be_open or motion.status[0] != Status.CONVERGED:
         return ""
-    return unchosen(inputs, motion.q[0].copy(), motion.is_folded)
+    return unchosen(inputs, motion.states[0, :, 0].copy(), motion.is_folded)
 
 
 def start_of_first(inputs: Inputs, solution: Solution) -> str:
@@ -108,31 +108,33 @@ def solution_of(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
     if motion.near and success:
         warnings.warn(_nearly(inputs, motion.near), SingularConfigurationWarning, stacklevel=4)
     return Solution(
-        t=inputs.t,
-        q=motion.q,
-        q_dot=motion.q_dot,
-        q_ddot=motion.q_ddot,
-        status=motion.status,
-        residual=motion.residual,
-        iterations=motion.iterations,
         success=success,
         message=_verdict(inputs, motion, outcome) + motion.note,
-        statistics=motion.statistics,
-        events=motion.events,
-        **about(inputs),
+        **fields_of(inputs, motion),
     )
 
 
+def fields_of(inputs: Inputs, motion: Motion) -> dict[str, Any]:
+    """Return the fields of a solution that the motion of one parameter set has, or of several."""
+    q, q_dot, q_ddot = (values.T for values in motion.states)
+    status, residual, iterations = motion.status.T, motion.residual.T, motion.iterations.T
+    said = {"statistics": motion.statistics, "events": motion.events, **about(inputs)}
+    return dict(
+        t=inputs.t, q=q, q_dot=q_dot, q_ddot=q_ddot,
+        status=status, residual=residual, iterations=iterations, **said,
+    )  # fmt: skip
+
+
 def about(inputs: Inputs) -> dict[str, Any]:
-    """Return what a solution of one parameter set says of its mechanism, by field."""
-    code = inputs.code
+    """Return what a solution says of its mechanism, by field."""
+    code, p = inputs.code, inputs.p.tolist() if inputs.sets is None else inputs.sets.T
     return {
         "name": code.name,
         "coordinates": code.coordinates,
         "equations": code.equations,
         "units": dict(code.units),
-        "parameters": dict(zip(code.parameters, inputs.p.tolist(), strict=True)),
-        "sweep": {},
+        "parameters": dict(zip(code.parameters, p, strict=True)),
+        "sweep": dict(inputs.sweep),
         "module": code.module,
     }
 

@@ -119,10 +119,8 @@ class Compiled:
     blocks: tuple[NDArray[Any], ...]
     # Of a module in grouped form: Phi and the entries of Phi_q at one point.
     evaluate: Callable[..., tuple[Array, Array]] | None
-    # march, march_variants: of a compiled module: its own march over times, and of many parameter
-    # sets
-    march: Callable[..., int] | None
-    march_variants: Callable[..., int] | None
+    # Of a compiled module: its own march over times, of one motion or of many parameter sets.
+    march: Callable[..., None] | None
     # Of a module with outputs: puts them and their rates at states (n, N) into (3, r, N).
     observe_into: Callable[..., None] | None
     # Of a module with outputs: gives them at one state of plain floats, (q, q_dot, q_ddot, t, p);
@@ -306,7 +304,6 @@ def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compi
         blocks=names.get("BLOCKS", ()),
         evaluate=names.get("evaluate"),
         march=names.get("march"),
-        march_variants=names.get("march_variants"),
         observe_into=_observing(names, lanes),
         observe_floats=observe and partial(observe, names["FLOATS"]),
         makers={},

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from ctypes import byref, c_size_t
+from ctypes import byref
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,7 +38,7 @@ from kincompile.runtime.native.structures import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
@@ -61,8 +61,8 @@ LINE = 64 // NUMBER
 def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     """Replace the functions of an emitted NumPy module by compiled ones, from what C emitted.
 
-    Where the mechanism has a planned solve the module gets two more, ``march`` and
-    ``march_variants``. An `UnsupportedError` says what is wrong with the compiler.
+    Where the mechanism has a planned solve the module gets one more, ``march``. An
+    `UnsupportedError` says what is wrong with the compiler.
     """
     code, names = code_of(module), vars(module)
     present = code.quantities
@@ -74,7 +74,6 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     if "solve" in names:
         compiled["solve"] = functions.solve(names["_system"])
         compiled["march"] = functions.march()
-        compiled["march_variants"] = functions.march_variants()
     if "observe" in names:
         compiled["observe_into"] = functions.observe_into()
     for name, function in compiled.items():
@@ -271,75 +270,45 @@ class _Functions:
 
     def march(self) -> Function:
         """Return the march over a time grid."""
-        run = getattr(self._library, f"{self._name}_march")
-        run.restype = c_size_t
+        one, many = (
+            getattr(self._library, f"{self._name}_{name}") for name in ("march", "march_variants")
+        )
 
         def march(
             inputs: Inputs,
             guess: Array,
             size: float,
             tolerance: float,
-            states: Sequence[Array],
-            residual: Array,
-            status: NDArray[np.intc],
-            iterations: NDArray[np.intc],
-        ) -> int:
-            """Follow the motion from a guess, for a size of the mechanism, while points converge.
-
-            Fills position, velocity and acceleration, (n, N) each, and of every point the largest
-            absolute value of Phi, the `Status` and the Newton iterations, (N,) each. Returns how
-            many points converged, from the first one on.
-            """
-            t, p = inputs.t, inputs.p
-            motion = Motion(t.size, t.ctypes.data, p.ctypes.data, guess.ctypes.data)
-            _fill(motion, inputs, (size, tolerance), states, (residual, status, iterations))
-            return int(run(byref(motion)))
-
-        return march
-
-    def march_variants(self) -> Function:
-        """Return the march of many parameter sets."""
-        run = getattr(self._library, f"{self._name}_march_variants")
-        run.restype = c_size_t
-
-        def march_variants(
-            inputs: Inputs,
-            guess: Array,
-            size: float,
-            tolerance: float,
-            sets: Array,
+            sets: Array | None,
             states: Array,
             residual: Array,
             status: NDArray[np.intc],
             iterations: NDArray[np.intc],
-        ) -> int:
-            """Follow the motion of each variant from a guess as long as it converges.
+        ) -> None:
+            """Follow the motion from a guess, for a size of the mechanism, while points converge.
 
-            The guess is that of all, (n,), or of each, (n, B), and `sets` (B, k) are the
-            parameters; filled are `states` (3, N, n, B) with position, velocity and acceleration,
-            and residual, status and iterations, (N, B) each. Returns how many variants converged
-            at all times.
+            Fills `states` (3, n, N) with position, velocity and acceleration, and of every point
+            the largest absolute value of Phi, the `Status` and the Newton iterations, (N,) each.
+            Given sets of parameters (B, k), it does so for each, from one guess (n,) or from one
+            of each (n, B); all that is filled has B as its last axis.
             """
-            t, given = inputs.t, [numbers_of_batch(x) for x in (sets.T, guess)]
-            motions = Variants(t.size, len(sets), t.ctypes.data, *given)
-            motions.time = states.strides[1] // NUMBER
-            _fill(motions, inputs, (size, tolerance), states[:, 0], (residual, status, iterations))
-            return int(run(byref(motions)))
+            motion: Any
+            t = inputs.t
+            if sets is None:
+                motion = Motion(t.size, t.ctypes.data, inputs.p.ctypes.data, guess.ctypes.data)
+                first = states
+            else:
+                given = [numbers_of_batch(x) for x in (sets.T, guess)]
+                motion = Variants(t.size, len(sets), t.ctypes.data, *given)
+                motion.time, first = states.strides[2] // NUMBER, states[:, :, 0]
+            motion.size, motion.tolerance = size, tolerance
+            motion.max_iterations = inputs.max_iterations
+            motion.q, motion.q_dot, motion.q_ddot = map(numbers_of_batch, first)
+            said = (residual, status, iterations)
+            motion.residual, motion.status, motion.iterations = (x.ctypes.data for x in said)
+            (one if sets is None else many)(byref(motion))
 
-        return march_variants
-
-
-def _fill(
-    motion: Motion | Variants,
-    inputs: Inputs,
-    scales: tuple[float, float],
-    states: Iterable[Array],
-    said: Iterable[NDArray[Any]],
-) -> None:
-    """Say how a march is followed, and where it puts what it finds."""
-    (motion.size, motion.tolerance), motion.max_iterations = scales, inputs.max_iterations
-    motion.q, motion.q_dot, motion.q_ddot = map(numbers_of_batch, states)
-    motion.residual, motion.status, motion.iterations = (array.ctypes.data for array in said)
+        return march
 
 
 def _shapes(code: Compiled) -> dict[str, tuple[int, ...]]:

@@ -127,7 +127,6 @@ def test_that_a_module_is_read_once_and_again_when_it_is_compiled(example_named,
     assert code_of(module) is code_of(module)
     native = code_of(example_named("four_bar").native)
     assert native.march is not None
-    assert native.march_variants is not None
     assert code_of(module).march is None
     assert native.lanes is not None
 

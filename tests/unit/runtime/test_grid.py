@@ -87,9 +87,9 @@ def test_that_points_that_are_not_trusted_are_marched(example_named, monkeypatch
     whole = kc.solve(module, t)
     solve_block = grid_module._solve_block  # noqa: SLF001 - a fault is put into it
 
-    def doubting(march, times, result, block, *limits):
-        solve_block(march, times, result, block, *limits)
-        result.good[block][100:110] = False
+    def doubting(march, times, states, residual, good, smallest):
+        solve_block(march, times, states, residual, good, smallest)
+        good[100:110] = False
 
     monkeypatch.setattr(grid_module, "_solve_block", doubting)
     solution = kc.solve(module, t)
