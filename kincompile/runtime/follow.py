@@ -18,17 +18,15 @@ from kincompile.runtime.march import March, Outcome, State
 from kincompile.runtime.problem import problem
 from kincompile.runtime.singular.events import (
     DOUBTS,
-    branch_switch,
+    ended,
     involved,
-    locate,
     singular_start,
-    status_after,
 )
 from kincompile.runtime.start import give_up, start
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -144,8 +142,7 @@ def follow(
         return motion, outcome
     outcome = way.run(outcome)
     while explains and outcome.status is not Status.CONVERGED:
-        passage = way.explain(outcome)
-        outcome = way.judged(outcome)
+        outcome, passage = way.explain(outcome)
         if passage is None or not inputs.smooth:
             break
         outcome = way.run(way.go_through(passage))
@@ -219,45 +216,31 @@ class _Way:
             self._alive()
         return outcome
 
-    def explain(self, outcome: Outcome) -> Passage | None:
-        """Find the event that ends the motion; return the way through it if there is one."""
-        motion, equations, state = self._motion, self._march.equations, outcome.state
-        t = float(self._times[self._index - 1])
+    def explain(self, outcome: Outcome) -> tuple[Outcome, Passage | None]:
+        """Find the event that ends the motion, and the way through it if there is one.
+
+        The outcome, and the point that failed, get the status of the event.
+        """
+        motion, equations, last = self._motion, self._march.equations, self._index - 1
+        t, passage = float(self._times[last]), None
         if not self._may_be_dense or outcome.exhausted:
-            return None
-        if state is None:
-            if outcome.status is Status.SINGULAR and outcome.position is not None:
-                motion.undriven = equations.code.undriven()
-                if not motion.undriven:
-                    motion.events += filter(None, [singular_start(equations, outcome.position, t)])
-            return None
-        # A rounding error before it a state is too near to say what it is: the point before is not.
-        found = locate(self._march, state, t) or self._locate_from_point(t)
-        if found is not None:
-            motion.events.append(found[0])
-            return found[1]
-        if outcome.jumps and outcome.nearest is not None:
-            q = outcome.nearest.q
-            motion.events.append(branch_switch(equations.code, state, t, q, equations.reference))
-        return None
+            return outcome, None
+        if outcome.state is not None:
+            outcome, event, passage = ended(self._march, outcome, t, self._point_before())
+            motion.events += [event] if event else []
+            motion.status[last] = outcome.status
+        elif outcome.status is Status.SINGULAR and outcome.position is not None:
+            motion.undriven = equations.code.undriven()
+            if not motion.undriven:
+                motion.events += filter(None, [singular_start(equations, outcome.position, t)])
+        return outcome, passage
 
-    def judged(self, outcome: Outcome) -> Outcome:
-        """Give a failed point the status of the event that ends the motion before it."""
-        motion, index = self._motion, self._index - 1
-        if motion.events and motion.events[-1] not in motion.passed:
-            t = float(self._times[index])
-            outcome = replace(outcome, status=status_after(motion.events[-1], outcome, t))
-            motion.status[index] = outcome.status
-        return outcome
-
-    def _locate_from_point(self, t: float) -> tuple[Event, Passage | None] | None:
-        """Find the event that ends the motion from the last of the times that was reached."""
-        index = self._index - 2
-        if index < 0:
-            return None
-        q = np.ascontiguousarray(self._motion.states[0, :, index])
-        state = self._state(q, float(self._times[index])).state
-        return None if state is None else locate(self._march, state, t)
+    def _point_before(self) -> Iterator[State]:
+        """Yield the last of the times that was reached, if there is one."""
+        if (index := self._index - 2) >= 0:
+            q = np.ascontiguousarray(self._motion.states[0, :, index])
+            if state := self._state(q, float(self._times[index])).state:
+                yield state
 
     def go_through(self, passage: Passage) -> Outcome:
         """Fill the points within the passage through a bifurcation, and take the next one."""

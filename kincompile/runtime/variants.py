@@ -34,7 +34,7 @@ from kincompile.runtime.march import (
     some_of,
 )
 from kincompile.runtime.results.solution import Solution
-from kincompile.runtime.singular.events import locate, status_after
+from kincompile.runtime.singular.events import ended
 from kincompile.runtime.start import give_up, start
 from kincompile.runtime.status import Status
 from kincompile.runtime.verdict import fields_of
@@ -341,8 +341,8 @@ class _Chunk:
         ):
             t, own = self._times[index], replace(self._inputs, p=p)
             outcome = give_up(alone, end, t, own, is_in_vain=is_in_vain)
-            if not outcome.exhausted and (found := locate(alone, known, t)):
-                outcome = replace(outcome, status=status_after(found[0], outcome, t))
+            if not outcome.exhausted:
+                outcome, *_ = ended(alone, outcome, t, [known])
             self._take(index, variant, outcome)
 
     def _record(self, lanes: _Lanes, state: State, good: Mask, iterations: Any) -> None:

@@ -8,8 +8,9 @@ may go on along either.
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +24,7 @@ from kincompile.runtime.singular.curve import Bracket, Curve
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from kincompile.runtime.engine.code import Compiled
     from kincompile.runtime.engine.linear import Array as Vector
@@ -153,6 +154,26 @@ def locate(march: March, state: State, latest: float) -> tuple[Event, Passage | 
     kind = LOCK_UP if bracket.turns else BIFURCATION
     event = _event(equations, kind, place.q, place.t, place.point.Phi_q)
     return event, None if bracket.turns else _passage(march, curve, bracket, at)
+
+
+def ended(
+    march: March, outcome: Outcome, t: float, before: Iterable[State]
+) -> tuple[Outcome, Event | None, Passage | None]:
+    """Find the event that ends a motion on the way to a time, and the way through it if any.
+
+    The outcome gets its status. From the point before is looked too: a rounding error before an
+    event a state is too near to say what it is.
+    """
+    equations, state, nearest = march.equations, outcome.state, outcome.nearest
+    assert state is not None
+    places = itertools.chain([state], before)
+    found = next(filter(None, (locate(march, place, t) for place in places)), None)
+    if not found and outcome.jumps and nearest is not None:
+        switch = branch_switch(equations.code, state, t, nearest.q, equations.reference)
+        found = switch, None
+    if not found:
+        return outcome, None, None
+    return replace(outcome, status=status_after(found[0], outcome, t)), *found
 
 
 def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
