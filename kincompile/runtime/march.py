@@ -55,6 +55,9 @@ SIGN_OF_LIFE = 256
 CLOSE = 0.1
 """Part of the largest sensitivity above which a step that fails is one towards a singularity."""
 
+SOON = 0.1
+"""Part of the time of a movement in which velocities that grow end it soon."""
+
 GROWTH = 1.5
 """By what a step of a batch is longer than the one before it."""
 
@@ -296,19 +299,22 @@ class March:
         """Say of a batch that cannot be taken on by its smallest step where it is at a bifurcation.
 
         Phi_q is nearly singular there, and the motion goes on as it was predicted beyond where a
-        lock-up might be.
-        Equations that are left out may forbid one of the ways: nothing is said where there are any.
+        lock-up might be. Nothing is said where the growth of velocities may end it further on,
+        or where equations are left out, which may forbid one of the ways.
         """
         if self.equations.code.redundant:
             return False
-        ahead = np.maximum(BEYOND * self.time_of(state), LEFT * smallest)
+        pace = self.time_of(state)
+        ahead = np.maximum(BEYOND * pace, LEFT * smallest)
         forward = np.copysign(ahead, t - state.t)
+        _, left = self.until_lock_up(state, forward)
         predicted = self.predict(state, state.t + forward)
         found = self.correct_together(predicted.copy(), state.t + forward, MAX_CORRECTIONS)
         beyond, checks = self.complete(found.point)
         error, near = self.error(state, found.point.q, predicted)
         _, smooth = self.follows(state, beyond, error)
         good = found.good & near & (state.sensitivity > CLOSE * TOO_NEAR)
+        good &= (2 * left < ahead) | (left > SOON * pace)
         return all_hold(good, (*checks, smooth))
 
     def until_lock_up(self, state: State, forward: Any) -> tuple[Array, Array]:

@@ -236,6 +236,18 @@ def test_that_what_cannot_move_costs_at_most_ten_times_what_does(four_bar, monke
     assert spent[1] < 10 * spent[0]
 
 
+@pytest.mark.parametrize("left_out", [0.0, 1e-6, 1e-4])
+def test_that_an_end_just_before_another_one_is_a_lock_up(left_out):
+    # Rates of y grow as those of x do, once more: no step gets near enough to see that alone.
+    x, y, c = sympy.symbols("x y c")
+    equations = [x**2 + kc.t - 1, y**2 - x + c]
+    given = {"parameters": {c: 0.1}, "guess": {x: 1.0, y: 1.0}}
+    module = kc.compile(kc.ConstraintSystem("ends", [x, y], equations, **given))
+    t = np.append(np.linspace(0, 0.999, 30), 1 + 1e-5 * np.arange(-3.5, 2))
+    found = kc.solve(module, t, {"c": [left_out, left_out / 2]})
+    assert [row[(row != 0).argmax()] for row in found.status] == [Status.LOCK_UP] * 2
+
+
 def test_that_equations_without_values_are_no_lock_up():
     x = sympy.Symbol("x")
     end = sympy.Symbol("end")
