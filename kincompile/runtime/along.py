@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import BEYOND, LARGE_ERROR, MAX_CORRECTIONS, SMALLEST_PART
+from kincompile.criteria import BEYOND, LARGE_ERROR, MAX_CORRECTIONS
 from kincompile.runtime.engine.dense import Dense
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.engine.sparse import Sparse
-from kincompile.runtime.march import March, State, chosen, some_of
+from kincompile.runtime.lanes import Lanes, take_on
+from kincompile.runtime.march import March, State
+from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,9 +34,6 @@ if TYPE_CHECKING:
 FIRST, SECOND = 1e-5, 1e-4
 """Parts of a line over which differences give first and second derivatives, for predictions alone:
 what is found holds as Newton's method makes it hold."""
-
-MOST_PARTS = 1000
-"""Parts of a line after which its end is given up."""
 
 
 def along(code: Compiled, p: Array, t: float) -> Compiled:
@@ -91,36 +90,22 @@ def lead_together(
     bifurcation: the mechanism goes on there, but nothing says on which branch.
     """
     code = along(inputs.code, inputs.p, float(inputs.t[0]))
-    q = np.repeat(begin[:, np.newaxis], len(sets), axis=1)
-    way, part = np.zeros(len(sets)), np.ones(len(sets))
-    left = np.arange(len(sets))
+    q, count = np.repeat(begin[:, np.newaxis], len(sets), axis=1), len(sets)
+    reached, crosses = np.zeros((2, count), dtype=bool)
 
     def march_of(some: NDArray[np.intp]) -> March:
         engine = Planned(code, np.ascontiguousarray(sets[some].T))
         return March(equations, engine, inputs.tolerance)
 
-    march = march_of(left)
-    begun, _ = march.complete(march.engine.evaluate(q, way))
-    state = begun
-    for _ in range(MOST_PARTS):
-        to = np.minimum(way[left] + part[left], 1.0)
-        following, good, _ = march.step_together(state, to, MAX_CORRECTIONS)
-        state = chosen(good, following, state)
-        q[:, left], way[left] = state.point.q, state.t
-        part[left] = march.pace(state, 1.0, part[left], good, SMALLEST_PART)
-        locked = march.lock_up(begun, state, 1.0, SMALLEST_PART)
-        on = (way[left] < 1) & (part[left] > SMALLEST_PART) & ~locked
-        if not on.any():
-            break
-        if not on.all():
-            left, state, begun = left[on], some_of(state, on), some_of(begun, on)
-            march = march_of(left)
-    reached, crosses = way == 1, np.zeros(len(sets), dtype=bool)
-    lost = np.flatnonzero(~reached & (way > 0))
-    if lost.size:
-        beyond = march_of(lost).correct_together(q[:, lost], way[lost] + BEYOND, MAX_CORRECTIONS)
-        apart = equations.extent(beyond.point.q - q[:, lost])
-        crosses[lost] = beyond.good & (apart <= LARGE_ERROR)
+    def record(lanes: Lanes, state: State, good: Mask, _: Any) -> None:
+        own = lanes.motions[good]
+        q[:, own], reached[own] = state.point.q[:, good], True
+
+    everyone, march = np.arange(count), march_of(np.arange(count))
+    state, _ = march.complete(march.engine.evaluate(q, np.zeros(count)))
+    lanes = Lanes(everyone, np.ones(count, dtype=np.intp), state)
+    ends, status = take_on(lanes, np.array([0.0, 1.0]), march_of, record)
+    crosses[ends.motions] = status == Status.SINGULAR
     return q, reached, crosses
 
 

@@ -43,7 +43,7 @@ from kincompile.runtime.engine.scales import Point, column, within
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable
 
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.engine.linear import Linear
@@ -376,37 +376,6 @@ class March:
         else:
             return Outcome(Status.NOT_CONVERGED, iterations, state, exhausted=True)
         return Outcome(status, iterations, state)
-
-
-def batch(states: Sequence[State], combine: Callable[[Sequence[Array]], Array]) -> State:
-    """Return a batch of states whose arrays are combined from those of other batches."""
-    arrays = []
-    for state in states:
-        times, near = (
-            np.broadcast_to(x, state.q_dot.shape[1:]) for x in (state.t, state.sensitivity)
-        )
-        kept = state.determinants if state.probed is None else state.probed
-        arrays.append(
-            (times, state.point.q, state.q_dot, state.q_ddot, state.determinants, near, kept)
-        )
-    t, q, *rest = (combine(parts) for parts in zip(*arrays, strict=True))
-    nothing = np.empty(0)
-    return State(t, Point(q, t, nothing, nothing), *rest)
-
-
-def some_of(state: State, which: Any) -> State:
-    """Return some of a batch of states."""
-    return batch([state], lambda parts: parts[0][..., which])
-
-
-def joined(states: Sequence[State]) -> State:
-    """Return several batches of states as one."""
-    return batch(states, lambda parts: np.concatenate(parts, axis=-1))
-
-
-def chosen(which: Any, one: State, other: State) -> State:
-    """Return of each of a batch one state or the other."""
-    return batch([one, other], lambda parts: np.where(which, *parts))
 
 
 Checks = tuple[tuple[Any, Status], ...]

@@ -8,31 +8,18 @@ variant notices.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import (
-    MAX_CORRECTIONS,
-    MAX_SUBSTEPS,
-    SMALLEST_PART,
-    TOO_NEAR,
-)
+from kincompile.criteria import TOO_NEAR
 from kincompile.errors import BranchSwitchWarning, memory_for
 from kincompile.runtime.assembled import Begin, Sets, first_position, followed
 from kincompile.runtime.attempts import safeguarded
 from kincompile.runtime.follow import Motion, follow
-from kincompile.runtime.march import (
-    March,
-    Outcome,
-    State,
-    all_hold,
-    chosen,
-    joined,
-    largest,
-    some_of,
-)
+from kincompile.runtime.lanes import Lanes, take_on
+from kincompile.runtime.march import March, Outcome, State, all_hold, largest
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.singular.events import ended
 from kincompile.runtime.start import give_up, start
@@ -148,7 +135,7 @@ class _Chunk:
     def solve(self) -> None:
         """Solve: compiled, where the module can, and with care what fails."""
         if self._inputs.code.march is None:
-            self._follow(self._assembled())
+            self._finish(self._assembled())
             return
         everyone = np.arange(len(self._p))
         status, q = self._marched(everyone, self._begin.q)
@@ -163,16 +150,16 @@ class _Chunk:
     def _solve_from_own_places(self, status: Statuses) -> None:
         """Solve compiled what is not on the branch from the first position, but from its own."""
         lanes = self._assembled(status)
-        if not lanes.variants.size:
+        if not lanes.motions.size:
             return
-        found, _ = self._marched(lanes.variants, lanes.state.point.q)
+        found, _ = self._marched(lanes.motions, lanes.state.point.q)
         good = found[0] == Status.CONVERGED
-        self._go_on(lanes.variants[good])
+        self._go_on(lanes.motions[good])
         if not good.all():
             lanes = lanes.some(~good)
-            first = _Lanes(lanes.variants, lanes.index - 1, lanes.state)
-            self._record(first, lanes.state, np.ones(lanes.variants.size, bool), 0 * lanes.index)
-            self._follow(lanes)
+            first = Lanes(lanes.motions, lanes.index - 1, lanes.state)
+            self._record(first, lanes.state, np.ones(lanes.motions.size, bool), 0 * lanes.index)
+            self._finish(lanes)
 
     def _marched(self, variants: Places, guess: Array) -> tuple[Statuses, Array]:
         """Let the compiled march follow variants from a guess, or from one of each (n, V).
@@ -186,23 +173,6 @@ class _Chunk:
             self._motions.fill(variants, motions)
         return motions.status, motions.states[0, :, 0]
 
-    def _follow(self, lanes: _Lanes) -> None:
-        """Go through the grid with variants that are assembled."""
-        march, lost = self._sets.march(lanes.variants), list[_Lanes]()
-        for k, t in enumerate(self._times[1:] if lanes.variants.size else (), start=1):
-            following, good, iterations = march.step_together(lanes.state, t, MAX_CORRECTIONS)
-            self._record(lanes, following, good, iterations)
-            here, lanes = lanes, _Lanes(lanes.variants, lanes.index + 1, following)
-            if not good.all():
-                lost.append(here.some(~good))
-                self._motions.states[..., k:, lost[-1].variants] = np.nan
-                lanes = lanes.some(good)
-                march = self._sets.march(lanes.variants)
-                if not lanes.variants.size:
-                    break
-        if lost:
-            self._finish(_joined(lost))
-
     def _go_on(self, variants: Places) -> None:
         """Take those variants on that the compiled march has left on their way."""
         status = self._motions.status[:, variants]
@@ -211,7 +181,7 @@ class _Chunk:
         if failed.any():
             self._finish(self._known(variants[failed], (status[:, failed] != 0).argmax(axis=0)))
 
-    def _known(self, variants: Places, index: Places) -> _Lanes:
+    def _known(self, variants: Places, index: Places) -> Lanes:
         """Return variants on the way to times from the points before these."""
         found = self._motions.states[:, :, index - 1, variants]
         q, q_dot, q_ddot = (np.ascontiguousarray(values) for values in found)
@@ -220,18 +190,24 @@ class _Chunk:
         # These points are good, also where the elimination in a fixed order loses digits.
         near = np.fmin(state.sensitivity, TOO_NEAR)
         state = replace(state, q_dot=q_dot, q_ddot=q_ddot, sensitivity=near)
-        return _Lanes(variants, index, state)
+        return Lanes(variants, index, state)
 
-    def _finish(self, lanes: _Lanes) -> None:
+    def _finish(self, lanes: Lanes) -> None:
         """Take variants on, each at its own pace, and alone where that leads nowhere."""
-        while lanes.variants.size:
-            stuck = self._at_own_pace(lanes)
+        times = np.array(self._times)
+        while lanes.motions.size:
+            ends, status = take_on(lanes, times, self._sets.march, self._record)
+            for index, variant in zip(ends.index.tolist(), ends.motions.tolist(), strict=True):
+                self._motions.forget(slice(index, None), variant)
+            # Where exactly a motion ends is nothing that a set of many asks.
+            self._motions.status[ends.index, ends.motions] = status
+            stuck = ends.some(status == Status.NOT_REACHED)
             on = self._with_care(stuck)
             if not on.any():
                 break
-            lanes = self._known(stuck.variants[on], stuck.index[on] + 1)
+            lanes = self._known(stuck.motions[on], stuck.index[on] + 1)
 
-    def _assembled(self, known: Statuses | None = None) -> _Lanes:
+    def _assembled(self, known: Statuses | None = None) -> Lanes:
         """Assemble all variants at the first time; return those that are.
 
         Known may be what the compiled march said of them, as for `Sets.assembled`.
@@ -241,7 +217,7 @@ class _Chunk:
         state, checks = self._sets.march().complete(begun.point)
         good = all_hold(begun.on_branch, checks)
         good &= state.sensitivity <= TOO_NEAR
-        self._record(_Lanes(everyone, 0 * everyone, state), state, good, begun.iterations)
+        self._record(Lanes(everyone, 0 * everyone, state), state, good, begun.iterations)
         self._motions.forget(slice(None), ~good)
         over = ((begun.hopeless, Status.NOT_ASSEMBLED), (begun.left, Status.NOT_CONVERGED))
         for variants, status in over:
@@ -259,57 +235,13 @@ class _Chunk:
             good[variant] = self._take(0, variant, outcome)
         if good[bad].any():
             return self._known(everyone[good], 0 * everyone[good] + 1)
-        return _Lanes(everyone, 0 * everyone + 1, state).some(good)
+        return Lanes(everyone, 0 * everyone + 1, state).some(good)
 
-    def _at_own_pace(self, lanes: _Lanes) -> _Lanes:
-        """Take variants on, each by steps of its own, to the last time or to where it is stuck.
-
-        Who is stuck at a lock-up or a bifurcation gets its status, for where exactly it is nothing
-        that a set of many asks; returned are those that are stuck otherwise.
-        """
-        times, stuck = np.append(self._times, np.nan), [lanes.some(np.zeros(0, dtype=np.intp))]
-        march, begin, step = (
-            self._sets.march(lanes.variants),
-            lanes.state,
-            lanes.interval(times) / 2,
-        )
-        count, spent = np.zeros((2, step.size), dtype=np.int64)
-        while lanes.variants.size:
-            state, target = lanes.state, times[lanes.index]
-            whole = np.abs(step) >= np.abs(target - state.t)
-            aim = np.where(whole, target, state.t + step)
-            following, good, iterations = march.step_together(state, aim, MAX_CORRECTIONS)
-            count, spent = count + 1, spent + iterations
-            reached = good & whole
-            self._record(lanes, following, reached, spent)
-            smallest = SMALLEST_PART * np.abs(target - begin.t)
-            is_stuck = ~good & ((np.abs(step) <= smallest) | (count >= MAX_SUBSTEPS))
-            if is_stuck.any():
-                locked = is_stuck & march.lock_up(begin, state, target, smallest)
-                parted = is_stuck & ~locked & march.bifurcation(state, target, smallest)
-                exhausted = is_stuck & ~locked & ~parted & (count >= MAX_SUBSTEPS)
-                self._end(lanes, locked, Status.LOCK_UP)
-                self._end(lanes, parted, Status.SINGULAR)
-                self._end(lanes, exhausted, Status.NOT_CONVERGED)
-                stuck.append(lanes.some(is_stuck & ~locked & ~parted & ~exhausted))
-            lanes = _Lanes(lanes.variants, lanes.index + reached, chosen(good, following, state))
-            begin = chosen(reached, following, begin)
-            forward = lanes.interval(times)
-            size = march.pace(lanes.state, forward, step, good, smallest)
-            step = np.where(reached, forward, np.copysign(size, forward))
-            count, spent = np.where(reached, 0, count), np.where(reached, 0, spent)
-            left = ~is_stuck & (lanes.index < len(self._times))
-            if not left.all():
-                lanes, begin = lanes.some(left), some_of(begin, left)
-                step, count, spent = step[left], count[left], spent[left]
-                march = self._sets.march(lanes.variants)
-        return _joined(stuck)
-
-    def _with_care(self, lanes: _Lanes) -> Mask:
+    def _with_care(self, lanes: Lanes) -> Mask:
         """Take variants to their next times alone; say which get there and go on."""
-        on = np.zeros(lanes.variants.size, dtype=bool)
+        on = np.zeros(lanes.motions.size, dtype=bool)
         lost: list[_Lost] = []
-        each = zip(lanes.variants.tolist(), lanes.index.tolist(), strict=True)
+        each = zip(lanes.motions.tolist(), lanes.index.tolist(), strict=True)
         for lane, (variant, index) in enumerate(each):
             q = np.ascontiguousarray(self._motions.states[0, :, index - 1, variant])
             alone = self._sets.alone(variant, q)
@@ -345,25 +277,19 @@ class _Chunk:
                 outcome, *_ = ended(alone, outcome, t, [known])
             self._take(index, variant, outcome)
 
-    def _record(self, lanes: _Lanes, state: State, good: Mask, iterations: Any) -> None:
+    def _record(self, lanes: Lanes, state: State, good: Mask, iterations: Any) -> None:
         """Write down the variants that are good, each at its own next time."""
-        motions, index, own = self._motions, lanes.index[good], lanes.variants[good]
+        motions, index, own = self._motions, lanes.index[good], lanes.motions[good]
         found = state.point.q, state.q_dot, state.q_ddot
-        together = own.size == len(self._p) and (index == index[0]).all()
+        is_all = own.size == len(self._p) and (index == index[0]).all()
         for target, values in zip(motions.states, found, strict=True):
-            if together:
+            if is_all:
                 target[:, index[0]] = values
             else:
                 target[:, index, own] = values[:, good]
         motions.status[index, own] = Status.CONVERGED
         motions.residual[index, own] = largest(state.point.Phi, good.size)[good]
         motions.iterations[index, own] = iterations[good]
-
-    def _end(self, lanes: _Lanes, over: Mask, status: Status) -> None:
-        """Write down variants whose motions end before their next times."""
-        index, own = lanes.index[over], lanes.variants[over]
-        self._motions.status[index, own] = status
-        self._motions.states[..., index, own] = np.nan
 
     def _take(self, index: int, variant: int, outcome: Outcome) -> bool:
         """Write down what was found for one variant alone; say whether it goes on from there."""
@@ -372,30 +298,6 @@ class _Chunk:
             status = Status.SINGULAR  # its rates are too uncertain to go on from
         self._motions.of(variant).put(index, replace(outcome, status=status))
         return status is Status.CONVERGED
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Lanes:
-    """Some variants: their numbers, those of the times that each comes to next, their states."""
-
-    variants: Places
-    index: Places
-    state: State
-
-    def interval(self, times: Array) -> Array:
-        """Return how far each is from its next time; NaN after the last."""
-        return np.asarray(times[self.index] - self.state.t)
-
-    def some(self, which: Mask | Places) -> _Lanes:
-        """Return some of them."""
-        return _Lanes(self.variants[which], self.index[which], some_of(self.state, which))
-
-
-def _joined(parts: Sequence[_Lanes]) -> _Lanes:
-    """Return variants from several parts as one."""
-    variants = np.concatenate([part.variants for part in parts])
-    index = np.concatenate([part.index for part in parts])
-    return _Lanes(variants, index, joined([part.state for part in parts]))
 
 
 def _solution(inputs: Inputs, motions: Motion) -> Solution:

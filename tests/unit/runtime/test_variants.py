@@ -177,7 +177,7 @@ def test_that_compiled_code_follows_each_set_from_its_own_position(
     t = np.linspace(0, 4, 50)
     expected = kc.solve(example.module, t, {"a": lengths})
     steps: list[object] = []
-    monkeypatch.setattr("kincompile.runtime.variants._Chunk._follow", steps.append)
+    monkeypatch.setattr("kincompile.runtime.variants._Chunk._finish", steps.append)
     found = kc.solve(example.native, t, {"a": lengths})
     assert not steps
     np.testing.assert_array_equal(found.status, expected.status)
