@@ -120,7 +120,7 @@ class Compiled:
     # Of a module in grouped form: Phi and the entries of Phi_q at one point.
     evaluate: Callable[..., tuple[Array, Array]] | None
     # Of a compiled module: its own march over times, of one motion or of many parameter sets.
-    march: Callable[..., None] | None
+    march: Callable[..., int] | None
     # Of a module with outputs: puts them and their rates at states (n, N) into (3, r, N).
     observe_into: Callable[..., None] | None
     # Of a module with outputs: gives them at one state of plain floats, (q, q_dot, q_ddot, t, p);

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from ctypes import byref
+from ctypes import byref, c_size_t
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -273,6 +273,7 @@ class _Functions:
         one, many = (
             getattr(self._library, f"{self._name}_{name}") for name in ("march", "march_variants")
         )
+        one.restype = many.restype = c_size_t
 
         def march(
             inputs: Inputs,
@@ -284,13 +285,14 @@ class _Functions:
             residual: Array,
             status: NDArray[np.intc],
             iterations: NDArray[np.intc],
-        ) -> None:
+        ) -> int:
             """Follow the motion from a guess, for a size of the mechanism, while points converge.
 
             Fills `states` (3, n, N) with position, velocity and acceleration, and of every point
             the largest absolute value of Phi, the `Status` and the Newton iterations, (N,) each.
             Given sets of parameters (B, k), it does so for each, from one guess (n,) or from one
-            of each (n, B); all that is filled has B as its last axis.
+            of each (n, B); all that is filled has B as its last axis. Returns how many points
+            converged, from the first one on, or how many of the sets did at all times.
             """
             motion: Any
             t = inputs.t
@@ -306,7 +308,7 @@ class _Functions:
             motion.q, motion.q_dot, motion.q_ddot = map(numbers_of_batch, first)
             said = (residual, status, iterations)
             motion.residual, motion.status, motion.iterations = (x.ctypes.data for x in said)
-            (one if sets is None else many)(byref(motion))
+            return int((one if sets is None else many)(byref(motion)))
 
         return march
 

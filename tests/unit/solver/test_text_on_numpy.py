@@ -93,7 +93,8 @@ def native_march(native, t, p):
     guess, size = start_of(native, float(t[0]))
     states = np.full((3, native.N_COORDINATES, t.size), np.nan)
     residual, (status, iterations) = np.zeros(t.size), np.zeros((2, t.size), np.intc)
-    reached = native.march(inputs, guess, size, TOLERANCE, states, residual, status, iterations)
+    found = states, residual, status, iterations
+    reached = native.march(inputs, guess, size, TOLERANCE, None, *found)
     return reached, states, status, iterations
 
 
