@@ -98,8 +98,10 @@ def emit(
     Returns
     -------
     Emitted
-        The files; ``.source`` is the text of the main one, ``.write(folder)`` writes them. Where
-        the equations cannot determine the coordinates, ``.unsolvable`` says why.
+        The files; ``.source`` is the text of the main one, ``.write(folder)`` writes them. A NumPy
+        module ends with ``march(q, t, p)``, which follows a motion without kincompile, unless it is
+        in grouped form. Where the equations cannot determine the coordinates, there is no march,
+        and ``.unsolvable`` says why.
 
     Raises
     ------
@@ -128,7 +130,12 @@ def emit(
             code = _sensitive(code.program, sensitivities)
         if dynamics:
             code = _moving(code, system)
-        return emit_program(target, code)
+        emitted = emit_program(target, code)
+        if target != "numpy" or not isinstance(code, InlineProgram):
+            return emitted
+        from kincompile.emitters.numpy.march import with_march
+
+        return with_march(emitted, code.program)
 
 
 @contextmanager
@@ -213,8 +220,9 @@ def compile(  # noqa: A001 - the public name kc.compile
     Returns
     -------
     module
-        The emitted module, with Phi, Phi_q, nu, gamma and their fused forms. Where the equations
-        cannot determine the coordinates, ``UNSOLVABLE`` says why, and so does `solve`.
+        The emitted module, with Phi, Phi_q, nu, gamma and their fused forms, but without the march
+        at the end of a file: `solve` has its own. Where the equations cannot determine the
+        coordinates, ``UNSOLVABLE`` says why, and so does `solve`.
 
     Raises
     ------

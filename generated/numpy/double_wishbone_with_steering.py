@@ -33,6 +33,7 @@ The functions take one point, q of shape (28,), or batches: q (..., 28), t (...)
 What begins with an underscore runs on floats (f = FLOATS) and on arrays (f = ARRAYS), whose last
 axis is the batch. A11_b to A33_b are the rotation matrix of a body b; of a joint J, J_d_x to J_d_z
 are the vector d between its points, J_d_dot_x the rate of that.
+`march`, at the end of a file, follows a motion; `kc.compile` leaves it out, for `kc.solve`.
 """
 
 import math
@@ -2796,3 +2797,534 @@ def _checked(name, value, entries=None, axis=-1):
         found = ", ".join(x for x, row in zip(entries or (name,), rows) if not row.all())
         raise InputError(f"{NAME}: {name} is not finite in {found}; give finite numbers")
     return array
+
+
+# ---- march: a motion over times, on floats and lists. But for two tables it is alike in all modules.
+# It is the text of emitted C and Rust too: lanes are points that are worked on at once, here one.
+
+# which coordinates are angles, which equations repeat others
+_ANGULAR = (
+    False, False, False, True, True, True, True, False, False, False, True, True, True, True,
+    False, False, False, True, True, True, True, False, False, False, True, True, True, True,
+)
+_IS_REDUNDANT = (
+    False, False, False, False, False, False, False, False, False, False, False, False, False,
+    False, False, False, False, False, False, False, False, False, False, False, False, False,
+    False, False,
+)
+# numbers of size 1/2 to 1 and either sign without a pattern
+_PROBE = (
+    -0.8090169943749475, -0.6180339887498949, 0.9270509831248424, 0.7360679774997898,
+    -0.5450849718747373, -0.8541019662496847, 0.6631189606246322, 0.9721359549995796,
+    -0.7811529493745271, -0.5901699437494745, -0.899186938124422, 0.7082039324993694,
+    0.5172209268743169, -0.8262379212492643, -0.6352549156242118, 0.9442719099991592,
+    0.7532889043741067, -0.5623058987490541, -0.8713228931240016, -0.680339887498949,
+    0.9893568818738965, 0.7983738762488439, -0.6073908706237914, -0.9164078649987388,
+    0.7254248593736863, 0.5344418537486337, -0.8434588481235821, -0.6524758424985286,
+)
+_PATTERN, _PLACES, _NONZEROS = PATTERN.tolist(), _PHI_Q_NONZEROS.places, len(PATTERN)
+_LANES = 1  # points that are worked on at once
+# by what a march judges, and what became of a point
+_AGREEMENT = 1e-06
+_BEFORE_LOCK_UP = 0.0001
+_FARTHEST = 281474976.710656
+_GROWN = 8.0
+_KINK = 8.0
+_LEFT = 64.0
+_NEARLY_SINGULAR = 30.0
+_RESIDUAL_FACTOR = 10.0
+_ROUNDING = 3.552713678800501e-15
+_SMALL_ERROR = 0.05
+_SMALLEST_PART = 9.5367431640625e-07
+_SMOOTH = 1e-09
+_SOLVED = 1e-10
+_TOO_NEAR = 100000.0
+_MAX_CORRECTIONS = 6
+_MAX_SUBSTEPS = 10000
+_CONVERGED = 0
+_NOT_CONVERGED = 1
+_SINGULAR = 2
+_NOT_FINITE = 3
+_NOT_REACHED = 4
+_LOCK_UP = 7
+
+
+def march(q, t, p=DEFAULTS, size=None):
+    """Follow the motion over times t (N,) from a position q (28,), at t[0] or near it.
+
+    Returns q, q_dot, q_ddot (N, 28) and status (N,), which is 0 at the times that were reached,
+    from the first one on; (status == 0).sum() is how many. All later rows are NaN. The first status
+    above 0 says what ended the motion: 1 there is no position near the predicted one (at t[0], near
+    q), 2 Phi_q is singular, 3 a number is not finite, 7 a lock-up; 4 is a time that was not tried.
+
+    Newton's method starts from q without safeguards. p is (2,). The size is a long lever arm of
+    the mechanism, in its unit of length, by which errors are judged: by default the longest one
+    that Phi_q shows at q.
+    """
+    t, q, p = _checked("t", t), _checked("q", q, COORDINATES), _checked("p", p, PARAMETERS)
+    if (t.ndim, q.ndim, p.ndim) != (1, 1, 1) or not t.size or np.result_type(t, q, p) != _REAL:
+        raise InputError(
+            f"{NAME}: a march takes times t (N,), at least one, a position q ({N_COORDINATES},) "
+            f"and parameters p ({len(PARAMETERS)},), real numbers"
+        )
+    size = _size(q, t[0], p) if size is None else float(size)
+    if not 0.0 < size < math.inf:
+        raise InputError(f"{NAME}: the size of a mechanism is a length above 0, not {size}")
+    m, count = _Variants(), t.size
+    m.count, m.t, m.p, m.guess, m.size = count, t.tolist(), [p.tolist()], [q.tolist()], size
+    m.tolerance, m.max_iterations = 1e-10, 25
+    m.q, m.q_dot, m.q_ddot = np.full((3, count, N_COORDINATES), math.nan)
+    m.status, m.iterations, m.residual = [0] * count, [0] * count, [0.0] * count
+    with np.errstate(all="ignore"):
+        reached = _march(m)
+    for rows in (m.q, m.q_dot, m.q_ddot):
+        rows[reached:] = math.nan
+    return m.q, m.q_dot, m.q_ddot, np.array(m.status)
+
+
+def _size(q, t, p):
+    """Return the longest lever arm: the slope of an equation by an angle, by that by a length.
+
+    Where equations show none, the largest length of q serves.
+    """
+    is_angle = np.array(_ANGULAR)
+    slopes = np.abs(Phi_q(q + np.where(is_angle, _PROBE[:N_COORDINATES], 0.0), t, p))
+    lengths = slopes.max(axis=1, where=~is_angle, initial=0.0)
+    angles = slopes.max(axis=1, where=is_angle, initial=0.0)
+    with np.errstate(all="ignore"):
+        arms = angles[lengths > 0] / lengths[lengths > 0]
+    arm = arms.max(where=np.isfinite(arms), initial=0.0)
+    return float(arm or np.abs(q).max(where=~is_angle, initial=0.0) or 1.0)
+
+
+def _values(kernel, *given):
+    """Return what a kernel computes of floats; where they raise, as by 1/0, NumPy's numbers."""
+    try:
+        return kernel(FLOATS, *given)
+    except (ArithmeticError, ValueError):
+        return kernel(ARRAYS, *(np.array(x, dtype=float) for x in given))
+
+
+def _constants_at(b):
+    b.Phi_q = _PHI_Q_NONZEROS.start.tolist()
+
+
+def _position_at(b):
+    found = _values(_position, b.q, b.t, b.p)
+    b.Phi = found[:N_EQUATIONS]
+    for place, value in zip(_PLACES, found[N_EQUATIONS:]):
+        b.Phi_q[place] = value
+
+
+def _factor_at(b):
+    b.F, b.determinants = _values(_factor, [b.Phi_q[place] for place in _PLACES])
+
+
+def _nu_at(b):
+    b.nu = _values(_nu, b.q, b.t, b.p)
+
+
+def _gamma_at(b):
+    b.gamma = _values(_gamma, b.q, b.q_dot, b.t, b.p)
+
+
+def _solve_at(b, right):
+    return list(_values(_solve, b.F, right))
+
+
+def _missed_at(b, weight):
+    """Return what velocity and acceleration miss of their equations: sums of squares."""
+    first, second = list(b.nu), list(b.gamma)
+    for (i, j), slope in zip(_PATTERN, b.Phi_q):
+        first[i] -= slope * b.q_dot[j]
+        second[i] -= slope * b.q_ddot[j]
+    return tuple(sum(w * x * x for w, x in zip(weight, missed)) for missed in (first, second))
+
+
+def _copy(to, source):
+    """Take up a point as a good one, or go back to it."""
+    to.t, to.p, to.q = source.t, source.p, list(source.q)
+    to.q_dot, to.q_ddot = list(source.q_dot), list(source.q_ddot)
+    to.determinants = source.determinants
+
+
+def _ratio(a, b):
+    """Return a / b of positive numbers; floats raise where b is 0."""
+    return a / b if b else math.inf
+
+
+class _State:
+    """A good point of a motion."""
+
+    def __init__(self):
+        self.t = 0.0
+        self.p = [0.0] * len(PARAMETERS)
+        self.q = [0.0] * N_COORDINATES
+        self.q_dot = [0.0] * N_COORDINATES
+        self.q_ddot = [0.0] * N_COORDINATES
+        self.determinants = [0.0] * _BLOCKS
+
+
+class _Point:
+    """Points, and what the kernels compute there."""
+
+    def __init__(self):
+        self.t = 0.0
+        self.p = [0.0] * len(PARAMETERS)
+        self.q = [0.0] * N_COORDINATES
+        self.q_dot = [0.0] * N_COORDINATES
+        self.q_ddot = [0.0] * N_COORDINATES
+        self.determinants = [0.0] * _BLOCKS
+        self.Phi = [0.0] * N_EQUATIONS
+        self.Phi_q = [0.0] * _NONZEROS
+        self.nu = [0.0] * N_EQUATIONS
+        self.gamma = [0.0] * N_EQUATIONS
+
+
+class _Scales:
+    """By what the numbers of a motion are judged; each point has its own."""
+
+    def __init__(self):
+        # scale of each coordinate: 1 rad, or the size of the mechanism
+        self.reference = [0.0] * N_COORDINATES
+        # and its inverse: a division takes as long as five products
+        self.inverse = [0.0] * N_COORDINATES
+        # what the terms of each equation contribute at a generic position
+        self.magnitude = [0.0] * N_EQUATIONS
+        # what rounding errors of the coordinates leave of each equation
+        self.noise = [0.0] * N_EQUATIONS
+        # of the square of what an equation of rates misses
+        self.weight = [0.0] * N_EQUATIONS
+        self.tolerance = 0.0
+
+
+class _Outcome:
+    """What became of points; those that are over are not looked at any more."""
+
+    def __init__(self):
+        self.status = 0
+        self.iterations = 0
+        self.is_over = False
+        self.residual = 0.0
+        self.sensitivity = 0.0
+        # by how much velocities miss their equations, squared
+        self.by_velocity = 0.0
+        self.by_acceleration = 0.0
+
+
+class _Variants:
+    """Motions over the same times, each with parameters of its own, and where its numbers go."""
+
+    def __init__(self):
+        self.count = 0
+        self.variants = 0
+        self.t = ()
+        self.p = ()
+        self.guess = ()
+        self.size = 0.0
+        self.tolerance = 0.0
+        self.max_iterations = 0
+        self.q = ()
+        self.q_dot = ()
+        self.q_ddot = ()
+        self.residual = ()
+        self.status = ()
+        self.iterations = ()
+
+
+def _measure(b, size, s):
+    """Measure the equations of a mechanism around positions, which stay as they are."""
+    q = list(b.q)
+    for i in range(N_COORDINATES):
+        s.reference[i] = 1.0 if _ANGULAR[i] else size
+        s.inverse[i] = _ratio(1.0, s.reference[i])
+        b.q[i] += s.reference[i] * _PROBE[i]
+    _position_at(b)
+    s.magnitude = [0.0] * N_EQUATIONS
+    s.noise = [0.0] * N_EQUATIONS
+    for e in range(_NONZEROS):
+        i = _PATTERN[e][0]
+        j = _PATTERN[e][1]
+        slope = abs(b.Phi_q[e])
+        s.magnitude[i] += slope * s.reference[j]
+        most = _FARTHEST * s.reference[j]
+        place = abs(q[j]) if abs(q[j]) < most else most
+        s.noise[i] += _ROUNDING * slope * (s.reference[j] + place)
+    for i in range(N_EQUATIONS):
+        allowed = _AGREEMENT if _IS_REDUNDANT[i] else _SOLVED
+        terms = allowed * s.magnitude[i]
+        s.weight[i] = _ratio(1.0, terms * allowed * s.magnitude[i])
+    b.q = list(q)
+
+
+def _correct(b, s, most, o):
+    """Apply corrections until they are small, in scales of the coordinates.
+
+    A point whose corrections are stays where it is.
+    """
+    going = not o.is_over
+    iterations = 0
+    for iteration in range(most):
+        if not going:
+            break
+        is_large = False
+        _position_at(b)
+        _factor_at(b)
+        change = _solve_at(b, b.Phi)
+        for i in range(N_COORDINATES):
+            b.q[i] -= change[i] if going else 0.0
+            allowed = s.tolerance * s.reference[i] + _ROUNDING * abs(b.q[i])
+            is_large = is_large or not (abs(change[i]) <= allowed)
+        iterations += going
+        going = going and is_large
+    o.iterations = iterations
+    o.status = _NOT_CONVERGED if going else _CONVERGED
+
+
+def _complete(b, s, o):
+    """Check that the equations hold and that Phi_q is regular; solve for the rates.
+
+    These are looked at: elimination with pivots chosen beforehand may lose all digits. They may
+    miss their equations by parts of their size, the sum of their components in scales;
+    accelerations are measured by the square of the velocities too, which gamma is made of.
+    """
+    right = [0.0] * N_EQUATIONS
+    is_off = False
+    speed = 0.0
+    gain = 0.0
+    _position_at(b)
+    _factor_at(b)
+    o.residual = 0.0
+    o.sensitivity = 0.0
+    terms = max(_RESIDUAL_FACTOR * s.tolerance, _ROUNDING)
+    for i in range(N_EQUATIONS):
+        allowed = terms * s.magnitude[i] + s.noise[i]
+        size = abs(b.Phi[i])
+        o.residual = size if size > o.residual else o.residual
+        is_off = is_off or not (size <= allowed)
+        right[i] = s.magnitude[i] * _PROBE[i]
+    # A third right side, of the size of the equations' terms, shows how near to singular Phi_q is.
+    answer = _solve_at(b, right)
+    _nu_at(b)
+    b.q_dot = _solve_at(b, b.nu)
+    _gamma_at(b)
+    b.q_ddot = _solve_at(b, b.gamma)
+    for i in range(N_COORDINATES):
+        moved = abs(answer[i]) * s.inverse[i]
+        o.sensitivity = o.sensitivity if moved <= o.sensitivity else moved
+        speed += abs(b.q_dot[i]) * s.inverse[i]
+        gain += abs(b.q_ddot[i]) * s.inverse[i]
+    o.by_velocity, o.by_acceleration = _missed_at(b, s.weight)
+    first = speed * speed
+    second = (gain + first) * (gain + first)
+    is_met = o.by_velocity <= first and o.by_acceleration <= second
+    found = _CONVERGED if is_met else _SINGULAR
+    found = found if math.isfinite(first + second) else _NOT_FINITE
+    found = found if o.sensitivity <= _TOO_NEAR else _SINGULAR
+    found = _NOT_CONVERGED if is_off else found
+    found = found if math.isfinite(o.residual) else _NOT_FINITE
+    o.status = found if o.status == _CONVERGED else o.status
+
+
+def _step(b, s, t, o):
+    """Take points from where they are to other times.
+
+    Those that end too far from the prediction q + h q_dot + h^2 q_ddot / 2 have not converged.
+    Where the determinant of a block has changed its sign, a singular configuration lies between;
+    near one, the velocity must be where it was predicted too, compared with the position's error.
+    """
+    before = list(b.determinants)
+    h = t - b.t
+    b.t = t
+    for i in range(N_COORDINATES):
+        b.q[i] += h * (b.q_dot[i] + 0.5 * h * b.q_ddot[i])
+        b.q_dot[i] += h * b.q_ddot[i]
+    q = list(b.q)
+    q_dot = list(b.q_dot)
+    _correct(b, s, _MAX_CORRECTIONS, o)
+    _complete(b, s, o)
+    error = 0.0
+    kink = 0.0
+    has_crossed = False
+    for i in range(N_COORDINATES):
+        apart = abs(b.q[i] - q[i]) * s.inverse[i]
+        turn = abs(h * (b.q_dot[i] - q_dot[i])) * s.inverse[i]
+        error = error if apart <= error else apart
+        kink = turn if turn > kink else kink
+    for i in range(_BLOCKS):
+        stays = b.determinants[i] > 0.0 if before[i] > 0.0 else b.determinants[i] < 0.0
+        has_crossed = has_crossed or not stays
+    is_bent = o.sensitivity > _NEARLY_SINGULAR and kink > _KINK * error + _SMOOTH
+    is_past = is_bent or (o.status == _CONVERGED and has_crossed)
+    o.status = (_SINGULAR if is_past else o.status) if error <= _SMALL_ERROR else _NOT_CONVERGED
+
+
+def _speed_of(b, s):
+    """Return the largest velocity of a point, in scales of the coordinates."""
+    most = 0.0
+    for i in range(N_COORDINATES):
+        speed = abs(b.q_dot[i]) * s.inverse[i]
+        most = speed if speed > most else most
+    return most
+
+
+def _locks_up(b, s, t, smallest, before):
+    """Say whether a point that cannot be left by the smallest step is at a lock-up before a time.
+
+    There the equations must have values. Its speed was that before.
+    """
+    forward = t - b.t
+    speed = _speed_of(b, s)
+    growth = 0.0
+    for i in range(N_COORDINATES):
+        if abs(b.q_dot[i]) * s.inverse[i] == speed:
+            sign = 1.0 if b.q_dot[i] > 0.0 else -1.0
+            growth = b.q_ddot[i] * s.inverse[i] * sign
+    left = _ratio(speed, 2.0 * abs(growth)) if forward * growth > 0.0 else math.inf
+    if not (left <= _LEFT * smallest and speed >= _GROWN * before):
+        return False
+    b.t = t
+    _position_at(b)
+    total = 0.0
+    for i in range(N_EQUATIONS):
+        total += b.Phi[i]
+    return math.isfinite(total) and abs(forward) \
+        - left > _BEFORE_LOCK_UP / _SMALLEST_PART * smallest
+
+
+def _scales_of(own, s, k):
+    """Take the scales of one lane."""
+    own.tolerance = s.tolerance
+    for i in range(N_EQUATIONS):
+        own.magnitude[i] = s.magnitude[i]
+        own.noise[i] = s.noise[i]
+        own.weight[i] = s.weight[i]
+    for i in range(N_COORDINATES):
+        own.reference[i] = s.reference[i]
+        own.inverse[i] = s.inverse[i]
+
+
+def _advance(b, s, at, t, k, o):
+    """Take one lane from a good point to a time, in sub-steps.
+
+    These are halved where they fail and doubled where they do not.
+    """
+    alone = _Point()
+    own = _Scales()
+    found = _Outcome()
+    _constants_at(alone)
+    _scales_of(own, s, k)
+    found.is_over = False
+    _copy(alone, at)
+    before = _speed_of(alone, own)
+    smallest = abs(t - at.t) * _SMALLEST_PART
+    h = 0.5 * (t - at.t)
+    iterations = 0
+    is_stuck = False
+    for n in range(_MAX_SUBSTEPS):
+        is_whole = abs(h) >= abs(t - at.t)
+        following = t if is_whole else at.t + h
+        _copy(alone, at)
+        _step(alone, own, following, found)
+        is_good = found.status == _CONVERGED
+        iterations += found.iterations
+        if is_good:
+            _copy(at, alone)
+        is_stuck = not is_good and abs(h) <= smallest
+        if is_stuck or (is_good and is_whole):
+            break
+        h *= 2.0 if is_good else 0.5
+    status = found.status
+    if status == _CONVERGED and at.t != t:
+        status = _NOT_CONVERGED
+    if is_stuck:
+        _copy(alone, at)
+        if _locks_up(alone, own, t, smallest, before):
+            status = _LOCK_UP
+    o.residual = found.residual
+    o.status = status
+    o.iterations = iterations
+    _copy(at, alone)
+    _copy(b, at)
+
+
+def _record(m, b, o, time, first, count):
+    """Write points at one time, from a variant on; those that are over have no numbers."""
+    m.q[time * m.variants + first] = b.q
+    m.q_dot[time * m.variants + first] = b.q_dot
+    m.q_ddot[time * m.variants + first] = b.q_ddot
+    place = time * m.variants + first
+    m.residual[place] = math.nan if o.is_over else o.residual
+    m.status[place] = o.status
+    m.iterations[place] = o.iterations
+    if o.is_over:
+        for i in range(N_COORDINATES):
+            m.q[time * m.variants + first][i] = math.nan
+            m.q_dot[time * m.variants + first][i] = math.nan
+            m.q_ddot[time * m.variants + first][i] = math.nan
+
+
+def _assemble(m, b, s, first, count, o):
+    """Assemble variants from their guesses, at the first time."""
+    _constants_at(b)
+    s.tolerance = m.tolerance
+    for i in range(len(PARAMETERS)):
+        b.p[i] = m.p[first][i]
+    for i in range(N_COORDINATES):
+        b.q[i] = m.guess[first][i]
+    b.t = m.t[0]
+    o.is_over = False
+    _measure(b, m.size, s)
+    _correct(b, s, m.max_iterations, o)
+    _complete(b, s, o)
+    # The guess may be rough.
+    _measure(b, m.size, s)
+
+
+def _march(m):
+    """Follow one motion; return how many points converged, from the first one on.
+
+    The lanes are times of the motion, as if each were a variant at its own: all have the same
+    parameters, and what is written for a variant is the time's.
+    """
+    b = _Point()
+    s = _Scales()
+    o = _Outcome()
+    at = _State()
+    _assemble(m, b, s, 0, _LANES, o)
+    _record(m, b, o, 0, 0, 1)
+    _copy(at, b)
+    status = o.status
+    done = 1 if status == _CONVERGED else 0
+    width = 1
+    while status == _CONVERGED and done < m.count:
+        count = min(m.count - done, width)
+        good = 0
+        _copy(b, at)
+        _step(b, s, m.t[done], o)
+        while good < count and o.status == _CONVERGED:
+            good += 1
+        if good > 0:
+            _record(m, b, o, 0, done, good)
+            _copy(at, b)
+            done += good
+            # The fewer iterations, the more points the next prediction can serve.
+            if good < count or o.iterations > 3:
+                width = good // 2 if good > 1 else 1
+            else:
+                width = min(2 * width, _LANES)
+        elif count > 1:
+            width = 1
+        else:
+            _advance(b, s, at, m.t[done], 0, o)
+            _record(m, b, o, 0, done, 1)
+            status = o.status
+            if status == _CONVERGED:
+                done += 1
+    for k in range(done + 1, m.count):
+        m.status[k] = _NOT_REACHED
+    return done
+
+
+with np.errstate(all="ignore"):
+    _BLOCKS = len(_values(_factor, [1.0] * len(_PLACES))[1])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.emitters.lines import broken
 from kincompile.solver.nodes import (
+    COUNT,
     LANE,
     Assign,
     Binary,
@@ -31,7 +32,7 @@ from kincompile.solver.nodes import (
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from kincompile.solver.nodes import Expression, Function, Statement, Struct, Text
+    from kincompile.solver.nodes import Expression, Function, Statement, Struct, Text, Variable
 
 CHOICE, OR, AND, RELATION, SUM, PRODUCT, SIGN, ATOM = range(8)
 """Binding strengths, loosest first."""
@@ -217,6 +218,21 @@ class SolverPrinter:
 class OneLane(SolverPrinter):
     """Prints a solver in a language that takes one point at a time: a lane is a number."""
 
+    def __init__(self, text: Text) -> None:
+        super().__init__(text)
+        self.one: set[Variable] = set()  # what counts lanes, of which there is one
+
+    def block(self, statements: Sequence[Statement]) -> list[Lines]:
+        """Return the lines of statements: a loop over lanes is its body, of the one lane."""
+        parts: list[Lines] = []
+        for node in statements:
+            if isinstance(node, For) and node.over_lanes:
+                self.one.add(node.variable)
+                parts += self.block(node.body)
+            else:
+                parts.append(self.statement(node))
+        return parts
+
     def constant(self, node: Constant) -> str:
         """Return a number or the name of one."""
         return str(node.value).lower() if isinstance(node.value, bool) else str(node.value)
@@ -225,7 +241,7 @@ class OneLane(SolverPrinter):
         """Return a variable, a field or an entry, without the index of the one lane."""
         match node:
             case Name(variable):
-                return variable.name, ATOM
+                return "0" if variable in self.one else variable.name, ATOM
             case Field(struct, name):
                 return f"{struct.variable.name}.{name}", ATOM
             case Index(array, indices):
@@ -233,6 +249,20 @@ class OneLane(SolverPrinter):
                     indices = indices[:-1]
                 text = self.expression(array)
                 return text + "".join(f"[{self.expression(x)}]" for x in indices), ATOM
+
+    @staticmethod
+    def row_of(owner: Name, time: Sequence[Expression], variant: Expression) -> Expression:
+        """Return the number of a variant at a time, if there is one."""
+        if not time:
+            return variant
+        variants = Field(owner, "variants", COUNT)
+        return Binary("+", Binary("*", time[0], variants, COUNT), variant, COUNT)
+
+    def binary(self, sign: str, left: Expression, right: Expression) -> tuple[str, int]:
+        """Return an operation; nothing is added for the one lane."""
+        if sign == "+" and isinstance(right, Name) and right.variable in self.one:
+            return self.strong(left)
+        return super().binary(sign, left, right)
 
     def call(self, node: Call) -> tuple[str, int]:
         """Return a call; what any lane is, the one is, and copying is an assignment's."""

@@ -60,6 +60,7 @@ for path in sys.argv[1:]:
     rng = np.random.default_rng(7)
     q, q_dot = rng.uniform(-1, 1, (2, module["N_COORDINATES"]))
     values = module["kinematics"](q, q_dot, 0.4)
+    module["march"](module["GUESS"], [0.0, 0.1])
     results[module["NAME"]] = [value.tolist() for value in values]
 print(json.dumps(results))
 """

@@ -172,6 +172,16 @@ def test_that_a_parameter_of_any_name_is_a_parameter(every_name, target, quick_c
 
 
 @pytest.mark.slow
+def test_that_a_parameter_of_any_name_is_one_in_a_march(every_name, tmp_path):
+    kc.emit(every_name).write(tmp_path)
+    module = kc.load(tmp_path / "sum_of_it.py")
+    expected = 2.5 - expected_sum(every_name)
+    q, *_, status = module.march([1.001 * expected], [0.0, 0.1])
+    assert not status.any()
+    np.testing.assert_allclose(q, expected, rtol=1e-12)
+
+
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
 def test_that_a_parameter_of_any_name_is_one_in_javascript(every_name, tmp_path):
     kc.emit(every_name, target="javascript").write(tmp_path)

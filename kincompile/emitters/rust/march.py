@@ -21,7 +21,6 @@ if TYPE_CHECKING:
         If,
         Statement,
         Struct,
-        Text,
         Type,
         Variable,
     )
@@ -42,10 +41,6 @@ class RustSolver(OneLane):
         "abs": "abs", "finite": "is_finite", "floor": "floor", "max": "max", "min": "min",
         "sqrt": "sqrt",
     }  # fmt: skip
-
-    def __init__(self, text: Text) -> None:
-        super().__init__(text)
-        self.one: set[Variable] = set()  # what counts lanes, of which there is one
 
     def kind(self, kind: Type) -> str:
         """Return a type; a large matrix is not on the stack."""
@@ -79,7 +74,6 @@ class RustSolver(OneLane):
 
     def head(self, item: Function) -> Lines:
         """Return the first line of a function."""
-        self.one = set()
         given = []
         for x in item.parameters:
             mut = "mut " * self.is_changed(item, x)
@@ -134,17 +128,6 @@ class RustSolver(OneLane):
             limits = f"({limits}).step_by({self.expression(node.step)})"
         return f"for {node.variable.name} in {limits}"
 
-    def block(self, statements: Sequence[Statement]) -> list[Lines]:
-        """Return the lines of statements: a loop over lanes is its body, of the one lane."""
-        parts: list[Lines] = []
-        for node in statements:
-            if isinstance(node, For) and node.over_lanes:
-                self.one.add(node.variable)
-                parts += self.block(node.body)
-            else:
-                parts.append(self.statement(node))
-        return parts
-
     def loop(self, head: str, body: Sequence[Statement]) -> Lines:
         """Return a loop."""
         if head.startswith("while ("):
@@ -170,27 +153,16 @@ class RustSolver(OneLane):
     def leaf(self, node: Name | Field | Index) -> tuple[str, int]:
         """Return a variable, a field or an entry, without the index of the one lane."""
         match node:
-            case Name(variable) if variable in self.one:
-                return "0", ATOM
             case Index(Field(owner) as array, (row, *time, point)) if "any" in array.type.dims:
                 if array.type.dims == ("any",):
                     return f"{self.expression(array)}[{self.expression(point)}]", ATOM
                 size = SIZES["K" if array.name == "p" else "N"]
-                place = self.place(owner, time, point)
+                place = self.at(self.row_of(owner, time, point), ATOM)
                 return f"{self.expression(array)}[{place} * {size} + {self.expression(row)}]", ATOM
         return super().leaf(node)
 
-    def place(self, owner: Name, time: Sequence[Expression], variant: Expression) -> str:
-        """Return the number of a variant at a time."""
-        if not time:
-            return self.at(variant, ATOM)
-        first = self.at(time[0], ATOM)
-        return f"({first} * {owner.variable.name}.variants + {self.expression(variant)})"
-
     def binary(self, sign: str, left: Expression, right: Expression) -> tuple[str, int]:
-        """Return an operation; nothing is added for the one lane."""
-        if sign == "+" and isinstance(right, Name) and right.variable in self.one:
-            return self.strong(left)
+        """Return an operation."""
         return super().binary("/" if sign == "//" else sign, left, right)
 
     def choice(
@@ -212,7 +184,7 @@ class RustSolver(OneLane):
             case "solve", (Name(point), right):
                 return f"solve_at(&{point.name}.F, &{self.expression(right)})", ATOM
             case "store", (Field(owner) as block, rows, time, first, _):
-                place = self.place(owner, [time], first)
+                place = self.at(self.row_of(owner, [time], first), ATOM)
                 source, n = self.expression(rows), SIZES["N"]
                 return (
                     f"{self.expression(block)}[{place} * {n}..][..{n}].copy_from_slice(&{source})",

@@ -303,7 +303,7 @@ def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compi
         else None,
         blocks=names.get("BLOCKS", ()),
         evaluate=names.get("evaluate"),
-        march=names.get("march"),
+        march=names.get("compiled_march"),
         observe_into=_observing(names, lanes),
         observe_floats=observe and partial(observe, names["FLOATS"]),
         makers={},

@@ -61,7 +61,7 @@ LINE = 64 // NUMBER
 def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     """Replace the functions of an emitted NumPy module by compiled ones, from what C emitted.
 
-    Where the mechanism has a planned solve the module gets one more, ``march``. An
+    Where the mechanism has a planned solve the module gets one more, ``compiled_march``. An
     `UnsupportedError` says what is wrong with the compiler.
     """
     code, names = code_of(module), vars(module)
@@ -73,7 +73,7 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     compiled["kinematics_batch_last"] = functions.batch_last()
     if "solve" in names:
         compiled["solve"] = functions.solve(names["_system"])
-        compiled["march"] = functions.march()
+        compiled["compiled_march"] = functions.march()
     if "observe" in names:
         compiled["observe_into"] = functions.observe_into()
     for name, function in compiled.items():

@@ -94,7 +94,7 @@ def native_march(native, t, p):
     states = np.full((3, native.N_COORDINATES, t.size), np.nan)
     residual, (status, iterations) = np.zeros(t.size), np.zeros((2, t.size), np.intc)
     found = states, residual, status, iterations
-    reached = native.march(inputs, guess, size, TOLERANCE, None, *found)
+    reached = native.compiled_march(inputs, guess, size, TOLERANCE, None, *found)
     return reached, states, status, iterations
 
 

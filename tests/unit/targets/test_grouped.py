@@ -280,7 +280,7 @@ def test_that_a_large_mechanism_stays_numpys_where_c_is_asked_for(caplog):
         module = kc.compile(loops(40, "angle"), target="c")
     assert "loops is in grouped form, which C does not have: it stays NumPy's" in caplog.text
     assert module.FORM == "grouped"
-    assert not hasattr(module, "march")
+    assert not hasattr(module, "compiled_march")
     assert kc.solve(module, [0.0, 0.1]).success
 
 
