@@ -202,7 +202,7 @@ def test_that_the_march_ends_a_file(example_named):
 NAMES = ("march", "b", "s", "o", "m", "at", "size", "step", "correct", "most", "count", "N", "rows")
 
 
-def test_that_names_of_a_mechanism_are_none_of_the_text(loaded):
+def test_that_names_of_a_mechanism_do_not_meet_those_of_the_text(loaded):
     m = kc.Mechanism("march")
     before = m.ground
     for name in NAMES:
