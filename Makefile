@@ -27,7 +27,7 @@ BENCH_READY := $(VENV)/bench.stamp
 
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test test-all test-slow test-elsewhere lint format types goldens update-goldens docs pictures course bench clean
+.PHONY: help demo test test-all test-slow test-elsewhere lint format types budget goldens update-goldens docs pictures course bench clean
 
 help:
 	@echo "make demo            compile the wrecker boom, run it, show it on a page"
@@ -35,6 +35,7 @@ help:
 	@echo "make test-elsewhere  make test as on an older processor: numbers in emitted text are the same"
 	@echo "make lint            ruff check, ruff format       make format       repair what ruff can"
 	@echo "make types           mypy                          make bench        the benchmarks"
+	@echo "make budget          count the lines and what new things touch; fail above .ci/budget.toml"
 	@echo "make goldens         compare generated/ with re-emission, under several hash seeds"
 	@echo "make update-goldens  rewrite generated/"
 	@echo "make docs            the site: open site/index.html     make course   lessons to take along"
@@ -107,6 +108,9 @@ format: $(LINT_READY)
 
 types: $(LINT_READY)
 	@$(BIN)/mypy
+
+budget: $(VENV_READY)
+	@$(BIN)/python .ci/budget.py
 
 # Emission must not depend on the order of a set: the same bytes under every hash seed.
 goldens: $(TEST_READY)
