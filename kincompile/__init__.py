@@ -40,7 +40,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'kincompile' has no attribute {name!r}{near}")
     module = homes[name]
     if not module.startswith(_WITHOUT_SYMPY):
-        # What models need that they do not import: the text of a file, and pictures in a notebook.
+        # Models need these without importing them: the text of a file, pictures in a notebook.
         import_module("kincompile.files.write_model")
         if "IPython" in sys.modules:
             import_module("kincompile.view.notebook")

@@ -246,7 +246,7 @@ def _makers(
     code: InlineProgram | GroupedProgram,
     target: str,
 ) -> dict[Kind[Any], Callable[..., Any]]:
-    """Return what compiles more of a mechanism when that is asked for."""
+    """Return the compilers of further code of a mechanism, by kind of request."""
     from kincompile.runtime.engine import code as kinds
 
     makers: dict[Kind[Any], Callable[..., Any]] = {
@@ -283,7 +283,7 @@ def _loadable(target: str, system: ConstraintSystem, form: str | None) -> str:
 
 
 def emit_loadable(model: Mechanism | ConstraintSystem, target: str) -> LoadableSource:
-    """Return what another process makes the module from that `compile` gives.
+    """Return the sources from which another process makes the module of `compile`.
 
     Returns
     -------

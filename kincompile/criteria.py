@@ -25,8 +25,8 @@ WILD = 1e3
 """A coordinate beyond this many references is an iterate gone wild, not a larger scale."""
 
 STEEP = 1e6
-"""An equation this much steeper than at a generic position is beside a pole, where it is measured
-by what it is at the generic one: tan(x) at pi/2 is no root, however near one a step says it is."""
+"""An equation this much steeper than at a generic position is near a pole. Its scale is then that
+of the generic position, so that a vanishing step at tan(pi/2) is not taken for a root."""
 
 # Converged
 
@@ -134,8 +134,8 @@ NEAR_MISS = 1e-3
 # Near singular. Sensitivity: movement, in scales, for an error of one scale in the equations
 
 SINGULAR_SENSITIVITY = 1e7
-"""Beyond this rounding has taken half of the digits of q, and a double root cannot be told from two
-roots."""
+"""Beyond this rounding has taken half of the digits of q, and a double root cannot be
+distinguished from two roots."""
 
 TOO_NEAR = 1e5
 """Beyond this the rates of a sub-step are too uncertain to go on from: a bifurcation is approached
@@ -190,8 +190,8 @@ SMALLEST_PART = 2.0**-20
 LEFT, GROWN, BEFORE_LOCK_UP = 64.0, 8.0, 1e-4
 """How a march that cannot take its smallest step any more is known to be at a lock-up. Velocities
 grow there as one over the root of the time that is left, so that this is q_dot / (2 q_ddot): at
-most so many smallest steps. They have grown by so much since the time before, and the time that was
-to be reached lies beyond the lock-up by more than this part of the way to it."""
+most `LEFT` smallest steps. They have grown `GROWN` times since the time before, and the time to be
+reached lies beyond the lock-up by more than the part `BEFORE_LOCK_UP` of the way to it."""
 
 MAX_SUBSTEPS = 10_000
 """Sub-steps between two times after which the march is given up, about a second."""
@@ -308,7 +308,7 @@ def covers(bodies: Iterable[Sequence[int] | range]) -> list[Sequence[int]]:
 
 
 def first_of_cover(n: int, bodies: Iterable[Sequence[int] | range]) -> list[int]:
-    """Return of each of n coordinates the first Euler parameter of its body; n where it is none."""
+    """Return of each of n coordinates the first Euler parameter of its body; n of all others."""
     found = [n] * n
     for cover in covers(bodies):
         for column in cover:

@@ -163,7 +163,7 @@ class InternalError(KincompileError):
     Parameters
     ----------
     message : str
-        What was found that should be impossible.
+        The contradiction.
     """
 
     def __init__(self, message: str) -> None:

@@ -14,7 +14,7 @@ RESERVED = frozenset({"t", "pi", "alpha", "deg"})
 """Names with a meaning of their own in every expression."""
 
 SYMBOLS = frozenset({"a parameter", "a coordinate"})
-"""What has a name that occurs in expressions."""
+"""Kinds of names that occur in expressions."""
 
 COLUMNS = frozenset({"t", "status", "residual"})
 """Columns that every motion has besides its own, in tables and files."""
@@ -200,9 +200,9 @@ def correction(name: str, order: int) -> str:
 
 
 def without_loads(mechanism: str) -> str:
-    """Return what is said of a mechanism without masses that is to move from forces."""
+    """Return the message about a simulation of a mechanism without masses."""
     return (
-        f"{mechanism} has no masses and no forces, from which a motion would follow: give its "
+        f"{mechanism} has no masses and no forces, so there is no dynamics to simulate. Give its "
         "bodies masses, m.body(..., mass=..., inertia=...), and set m.gravity."
     )
 

@@ -24,8 +24,8 @@ def write_atomically(
     content : str or bytes
         The whole content.
     is_private : bool
-        Whether nobody else may read or write the file, whatever the umask. A link is then replaced
-        by the file.
+        Whether only the owner may read or write the file, whatever the umask. A link is then
+        replaced by the file.
 
     Returns
     -------

@@ -424,7 +424,7 @@ static void kinematics_of_strip(strip *at, size_t count)
         kinematics_at(at, lane, 1);
 }
 
-// What a solve needs of Phi_q, and the determinants of its blocks.
+// Factor Phi_q; also return the determinants of its blocks.
 // eliminated: phi_crank by motor, x_crank by A.x, y_crank by A.y, x_coupler by B.x
 // y_coupler by B.y, x_rocker by D.x, y_rocker by D.y
 // block: phi_coupler, phi_rocker by C.x, C.y
@@ -612,7 +612,7 @@ _always_inline void stream(double *to, double number)
 }
 #endif
 
-// Copy numbers; past the caches if so many are being written that those could not hold them: a batch
+// Copy numbers; past the caches if those could not hold all that is being written: a batch
 // of 100,000 points of a four-bar takes 33 ns a point so, and 58 without.
 _always_inline void copy(double *to, const double *from, size_t size, int is_far)
 {
@@ -1379,7 +1379,7 @@ size_t four_bar_march(const four_bar_motion *motion)
 #ifndef _WITHOUT_START
 
 // Which coordinates are angles or may be, and of each the first of its body's Euler parameters; N
-// where it is none.
+// of all others.
 static const int MAY_TURN[] = {
     0, 0, 1, 0, 0, 1, 0, 0, 1,
 };
@@ -1580,7 +1580,7 @@ static void fill_matrix(const double *scale, const double *terms, strip *b, star
         s->matrix[i][N] = -b->Phi[i][0] / divisor(terms[i]);
 }
 
-// Find the step by which so many rows miss least (Householder); return whether there is one.
+// Find the least-squares step of `count` rows (Householder); return whether one exists.
 static int solve_least(start *s, size_t count)
 {
     double total = 0.0;
@@ -1617,7 +1617,7 @@ static int solve_least(start *s, size_t count)
     return isfinite(total);
 }
 
-// Apply the whole correction to a position; return CONVERGED, or why there is none.
+// Apply the whole correction to a position; return CONVERGED, or the reason for failing.
 static int plain_step(const double *q, strip *b, start *s)
 {
     double trial[N];
@@ -1871,9 +1871,9 @@ static int leaves_branch(const double *q, strip *b, const start *s)
     return leaves;
 }
 
-// Take an attempt that converged as the best one, where it is nearer to what a guess means. What
-// is near the guess comes first, the nearest of it; then what is not far, then what is on its
-// branch, then the nearer.
+// Take an attempt that converged as the best one, where it is nearer to what a guess means.
+// Candidates are ranked: near the guess, by distance; not far from it; on its branch; then by
+// distance.
 static void take(strip *b, start *s, attempt *a, attempt *other, attempt *best)
 {
     unwind(s->meant, b, s, a, other);
@@ -2014,7 +2014,7 @@ static int is_settled(const start *s, const attempt *a)
 }
 
 // Make safeguarded attempts until one converges: from the guess, then further and further away.
-// With all bodies on a line no equation tells which way to bend. Where a position was found
+// With all bodies on a line Phi_q gives no direction in which to bend. Where a position was found
 // already, one is enough; else the best one ends as the attempt that misses the equations least.
 static void rescue(int is_sound, int most, strip *b, start *s, attempt *a, attempt *best)
 {
@@ -2045,7 +2045,7 @@ static void rescue(int is_sound, int most, strip *b, start *s, attempt *a, attem
     }
 }
 
-// Find a position from a guess, or why there is none, judged by what was found around one.
+// Find a position from a guess, or the reason for failing, by scales measured around one.
 static void find_position(const double *guess, int most, strip *b, start *s, attempt *best)
 {
     attempt plain;
@@ -2092,7 +2092,7 @@ static void find_position(const double *guess, int most, strip *b, start *s, att
     }
 }
 
-// Find a position from a guess, or why there is none, for a size of the mechanism.
+// Find a position from a guess, or the reason for failing, for a size of the mechanism.
 static void position_from(const double *guess, double size, int most, strip *b, start *s,
     attempt *best)
 {

@@ -86,7 +86,7 @@ enum {
     FOUR_BAR_NOT_FINITE = 3,     // an equation or a derivative is not a finite number
     FOUR_BAR_NOT_REACHED = 4,    // not tried, because an earlier point failed
     FOUR_BAR_LOCK_UP = 7,        // the drivers demand what the joints cannot give: velocities grow
-                                   // beyond all bounds before this time
+                                   // without bound before this time
 };
 
 // A guess of the position at a time. It may be rough: safeguarded steps, restarts and angles turned

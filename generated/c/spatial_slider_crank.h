@@ -97,7 +97,7 @@ enum {
     SPATIAL_SLIDER_CRANK_NOT_FINITE = 3,     // an equation or a derivative is not a finite number
     SPATIAL_SLIDER_CRANK_NOT_REACHED = 4,    // not tried, because an earlier point failed
     SPATIAL_SLIDER_CRANK_LOCK_UP = 7,        // the drivers demand what the joints cannot give: velocities grow
-                                   // beyond all bounds before this time
+                                   // without bound before this time
 };
 
 // A guess of the position at a time. It may be rough: safeguarded steps, restarts and angles turned

@@ -274,7 +274,7 @@ const cam_by_table = (() => {
         return evaluated(gamma_at, "gamma", { q, q_dot }, t, p);
     }
 
-    // What a solve needs of Phi_q, and the determinants of its blocks.
+    // Factor Phi_q; also return the determinants of its blocks.
     // eliminated: x_cam by shaft.x, y_cam by shaft.y, x_follower by guide.normal
     // y_follower by contact.y, phi_cam by motor
     // block: phi_follower by guide.parallel
@@ -360,7 +360,7 @@ const cam_by_table = (() => {
         const N = N_COORDINATES, M = N_EQUATIONS, NONZEROS = PATTERN.length;
         const BLOCKS = point().determinants.length, TALL = M + N, WIDE = N + 1, TURN = 2 * Math.PI;
         // Which coordinates are angles, or may be, and of each the first of its body's Euler parameters
-        // (N: it is none); which equations repeat others; numbers of size 1/2 to 1 and either sign without
+        // (N: not one); which equations repeat others; numbers of size 1/2 to 1 and either sign without
         // a pattern.
         const ANGULAR = [
             false, false, true, false, false, true, true,
@@ -660,7 +660,7 @@ const cam_by_table = (() => {
             }
         }
 
-        // Find the step by which so many rows miss least (Householder); return whether there is one.
+        // Find the least-squares step of `count` rows (Householder); return whether one exists.
         function solve_least(s, count) {
             let total = 0.0;
             for (let k = 0; k < N; k += 1) {
@@ -701,7 +701,7 @@ const cam_by_table = (() => {
         }
 
         const trial_of_plain_step = new Float64Array(N);
-        // Apply the whole correction to a position; return CONVERGED, or why there is none.
+        // Apply the whole correction to a position; return CONVERGED, or the reason for failing.
         function plain_step(q, b, s) {
             for (let i = 0; i < N; i += 1) {
                 trial_of_plain_step[i] = 1.0;
@@ -976,9 +976,9 @@ const cam_by_table = (() => {
             return leaves;
         }
 
-        // Take an attempt that converged as the best one, where it is nearer to what a guess means. What
-        // is near the guess comes first, the nearest of it; then what is not far, then what is on its
-        // branch, then the nearer.
+        // Take an attempt that converged as the best one, where it is nearer to what a guess means.
+        // Candidates are ranked: near the guess, by distance; not far from it; on its branch; then by
+        // distance.
         function take(b, s, a, other, best) {
             unwind(s.meant, b, s, a, other);
             const away = away_from(a.q, s.meant, s);
@@ -1126,7 +1126,7 @@ const cam_by_table = (() => {
 
         const begin_of_rescue = new Float64Array(N);
         // Make safeguarded attempts until one converges: from the guess, then further and further away.
-        // With all bodies on a line no equation tells which way to bend. Where a position was found
+        // With all bodies on a line Phi_q gives no direction in which to bend. Where a position was found
         // already, one is enough; else the best one ends as the attempt that misses the equations least.
         function rescue(is_sound, most, b, s, a, best) {
             let reach = 0.0;
@@ -1157,7 +1157,7 @@ const cam_by_table = (() => {
         }
 
         const opposite_of_find_position = new Float64Array(N);
-        // Find a position from a guess, or why there is none, judged by what was found around one.
+        // Find a position from a guess, or the reason for failing, by scales measured around one.
         function find_position(guess, most, b, s, best) {
             const plain = new_attempt();
             const a = new_attempt();
@@ -1625,8 +1625,8 @@ const cam_by_table = (() => {
             return found.status;
         }
 
-        /* Follow the motion from a good point to a time, in sub-steps and with pivoting. `position` is what
-           was found at that time, `state` the last point to go on from. */
+        /* Follow the motion from a good point to a time, in sub-steps and with pivoting. `position` is the
+           one found at that time, `state` the last point to go on from. */
         function advance(equations, from, t) {
             const at = spare(equations.p), last = spare(equations.p, equations), found = new_outcome();
             copy_state(at, from);
@@ -1750,7 +1750,7 @@ const cam_by_table = (() => {
             };
         }
 
-        /* What is there at a time that the motion does not reach. */
+        /* Look for a position at a time that the motion does not reach. */
         function giveUp(equations, outcome, t) {
             const attempt = assembled(equations, t, outcome.state.q);
             const jumps = attempt.status === CONVERGED;
@@ -2001,7 +2001,7 @@ const cam_by_table = (() => {
             return eventAt(equations, kind, at.q, at.t, at);
         }
 
-        /* The event that ended a motion; null where it did not end, or nobody knows why. The failed point
+        /* The event that ended a motion; null if it did not end, or for a reason unknown. The failed point
            gets its status: how Newton's method fails there rounding decides. */
         function explain(motion) {
             const { failed, status } = motion, event = failed && !failed.isExhausted ? endOf(motion) : null;

@@ -200,7 +200,7 @@ def _kinematics(f, q, q_dot, t, p):
 
 
 def _factor(f, J):
-    """Return what a solve needs of Phi_q, and the determinants of its blocks."""
+    """Factor Phi_q; also return the determinants of its blocks."""
     # eliminated: x_cam by shaft.x, y_cam by shaft.y, x_follower by guide.normal
     # y_follower by contact.y, phi_cam by motor
     # block: phi_follower by guide.parallel
@@ -377,7 +377,7 @@ DEFAULTS.flags.writeable = GUESS.flags.writeable = PATTERN.flags.writeable = Fal
 
 
 def _evaluate(kernel, skip, wanted, t, p, *states):
-    """Return a quantity or several, what a kernel computes after so many values."""
+    """Return one or several quantities from the values of a kernel; the first `skip` are others."""
     point = _point(t, p, states)
     if point is not None:
         try:

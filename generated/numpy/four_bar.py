@@ -206,7 +206,7 @@ def _kinematics(f, q, q_dot, t, p):
 
 
 def _factor(f, J):
-    """Return what a solve needs of Phi_q, and the determinants of its blocks."""
+    """Factor Phi_q; also return the determinants of its blocks."""
     # eliminated: phi_crank by motor, x_crank by A.x, y_crank by A.y, x_coupler by B.x
     # y_coupler by B.y, x_rocker by D.x, y_rocker by D.y
     # block: phi_coupler, phi_rocker by C.x, C.y
@@ -382,7 +382,7 @@ DEFAULTS.flags.writeable = GUESS.flags.writeable = PATTERN.flags.writeable = Fal
 
 
 def _evaluate(kernel, skip, wanted, t, p, *states):
-    """Return a quantity or several, what a kernel computes after so many values."""
+    """Return one or several quantities from the values of a kernel; the first `skip` are others."""
     point = _point(t, p, states)
     if point is not None:
         try:

@@ -112,7 +112,7 @@ def _kinematics(f, q, q_dot, t, p):
 
 
 def _factor(f, J):
-    """Return what a solve needs of Phi_q, and the determinants of its blocks."""
+    """Factor Phi_q; also return the determinants of its blocks."""
     # eliminated: x2 by equation_1, y2 by equation_2
     # block: phi3 by equation_3
     equation_1_phi3, equation_2_phi3, equation_3_x2, equation_3_y2 = J
@@ -264,7 +264,7 @@ DEFAULTS.flags.writeable = GUESS.flags.writeable = PATTERN.flags.writeable = Fal
 
 
 def _evaluate(kernel, skip, wanted, t, p, *states):
-    """Return a quantity or several, what a kernel computes after so many values."""
+    """Return one or several quantities from the values of a kernel; the first `skip` are others."""
     point = _point(t, p, states)
     if point is not None:
         try:

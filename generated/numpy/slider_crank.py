@@ -171,7 +171,7 @@ def _kinematics(f, q, q_dot, t, p):
 
 
 def _factor(f, J):
-    """Return what a solve needs of Phi_q, and the determinants of its blocks."""
+    """Factor Phi_q; also return the determinants of its blocks."""
     # eliminated: x_slider by wrist_pin.x, x_rod by crank_pin.x, x_crank by main_bearing.x
     # y_slider by guide_height, phi_slider by guide_angle, phi_crank by motor
     # y_crank by main_bearing.y, y_rod by crank_pin.y
@@ -349,7 +349,7 @@ DEFAULTS.flags.writeable = GUESS.flags.writeable = PATTERN.flags.writeable = Fal
 
 
 def _evaluate(kernel, skip, wanted, t, p, *states):
-    """Return a quantity or several, what a kernel computes after so many values."""
+    """Return one or several quantities from the values of a kernel; the first `skip` are others."""
     point = _point(t, p, states)
     if point is not None:
         try:

@@ -723,7 +723,7 @@ def _observe(f, q, q_dot, q_ddot, t, p):
 
 
 def _factor(f, J):
-    """Return what a solve needs of Phi_q, and the determinants of its blocks."""
+    """Factor Phi_q; also return the determinants of its blocks."""
     # eliminated: x_crank by O.x, y_crank by O.y, z_crank by O.z, x_slider by B.x, x_rod by A.x
     # y_slider by C.line_f, z_slider by C.line_g, y_rod by B.y, z_rod by B.z
     # block: pi_f_crank, pi_g_crank by O.f, O.g
@@ -1192,7 +1192,7 @@ DEFAULTS.flags.writeable = GUESS.flags.writeable = PATTERN.flags.writeable = Fal
 
 
 def _evaluate(kernel, skip, wanted, t, p, *states):
-    """Return a quantity or several, what a kernel computes after so many values."""
+    """Return one or several quantities from the values of a kernel; the first `skip` are others."""
     point = _point(t, p, states)
     if point is not None:
         try:

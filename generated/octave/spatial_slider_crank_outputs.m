@@ -57,7 +57,7 @@ outputs(4) = in_reals(acos((x_slider - x_A) / rod));  % transmission
 end
 
 function value = in_reals(value)
-% Outside the domain of a function there is no number; the language would go on with a complex one.
+% Outside the domain of a function there is no number; the language would continue with a complex one.
 if ~isreal(value)
     value = NaN;
 end

@@ -87,7 +87,7 @@ outputs_ddot(4) = -((x_slider_ddot - x_A_ddot) / (rod * transmission_2) ...
 end
 
 function value = in_reals(value)
-% Outside the domain of a function there is no number; the language would go on with a complex one.
+% Outside the domain of a function there is no number; the language would continue with a complex one.
 if ~isreal(value)
     value = NaN;
 end

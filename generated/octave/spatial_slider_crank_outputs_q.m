@@ -74,7 +74,7 @@ outputs_q(4, 15) = -transmission_2;  % transmission by x_slider
 end
 
 function value = in_reals(value)
-% Outside the domain of a function there is no number; the language would go on with a complex one.
+% Outside the domain of a function there is no number; the language would continue with a complex one.
 if ~isreal(value)
     value = NaN;
 end

@@ -196,7 +196,7 @@ pub fn gamma(
     at.gamma
 }
 
-// What a solve needs of Phi_q, and the determinants of its blocks.
+// Factor Phi_q; also return the determinants of its blocks.
 // eliminated: x2 by equation_1, y2 by equation_2
 // block: phi3 by equation_3
 fn factor_at(at: &mut Point) {
@@ -677,7 +677,7 @@ fn fill_matrix(scale: [f64; N_COORDINATES], terms: [f64; N_EQUATIONS], b: &Point
     }
 }
 
-/// Find the step by which so many rows miss least (Householder); return whether there is one.
+/// Find the least-squares step of `count` rows (Householder); return whether one exists.
 fn solve_least(s: &mut Start, count: usize) -> bool {
     let mut total: f64 = 0.0;
     for k in 0..N_COORDINATES {
@@ -717,7 +717,7 @@ fn solve_least(s: &mut Start, count: usize) -> bool {
     return total.is_finite();
 }
 
-/// Apply the whole correction to a position; return CONVERGED, or why there is none.
+/// Apply the whole correction to a position; return CONVERGED, or the reason for failing.
 fn plain_step(q: [f64; N_COORDINATES], b: &mut Point, s: &mut Start) -> usize {
     let mut trial = [0.0; N_COORDINATES];
     for i in 0..N_COORDINATES {
@@ -995,9 +995,9 @@ fn leaves_branch(q: [f64; N_COORDINATES], b: &mut Point, s: &Start) -> bool {
     return leaves;
 }
 
-/// Take an attempt that converged as the best one, where it is nearer to what a guess means. What
-/// is near the guess comes first, the nearest of it; then what is not far, then what is on its
-/// branch, then the nearer.
+/// Take an attempt that converged as the best one, where it is nearer to what a guess means.
+/// Candidates are ranked: near the guess, by distance; not far from it; on its branch; then by
+/// distance.
 fn take(b: &mut Point, s: &mut Start, a: &mut Attempt, other: &mut Attempt, best: &mut Attempt) {
     unwind(s.meant, b, s, a, other);
     let away = away_from(a.q, s.meant, s);
@@ -1145,7 +1145,7 @@ fn is_settled(s: &Start, a: &Attempt) -> bool {
 }
 
 /// Make safeguarded attempts until one converges: from the guess, then further and further away.
-/// With all bodies on a line no equation tells which way to bend. Where a position was found
+/// With all bodies on a line Phi_q gives no direction in which to bend. Where a position was found
 /// already, one is enough; else the best one ends as the attempt that misses the equations least.
 fn rescue(is_sound: bool, most: usize, b: &mut Point, s: &mut Start, a: &mut Attempt, best: &mut
     Attempt) {
@@ -1177,7 +1177,7 @@ fn rescue(is_sound: bool, most: usize, b: &mut Point, s: &mut Start, a: &mut Att
     }
 }
 
-/// Find a position from a guess, or why there is none, judged by what was found around one.
+/// Find a position from a guess, or the reason for failing, by scales measured around one.
 fn find_position(guess: [f64; N_COORDINATES], most: usize, b: &mut Point, s: &mut Start, best: &mut
     Attempt) {
     let mut plain = Attempt::new();
@@ -1228,7 +1228,7 @@ fn find_position(guess: [f64; N_COORDINATES], most: usize, b: &mut Point, s: &mu
     }
 }
 
-/// Find a position from a guess, or why there is none, for a size of the mechanism.
+/// Find a position from a guess, or the reason for failing, for a size of the mechanism.
 fn position_from(guess: [f64; N_COORDINATES], size: f64, most: usize, b: &mut Point, s: &mut Start,
     best: &mut Attempt) {
     s.meant = guess;

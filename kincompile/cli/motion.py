@@ -122,7 +122,7 @@ def sweep_options(command: Callable[..., None]) -> Callable[..., None]:
         multiple=True,
         metavar="NAME=FIRST:LAST:COUNT",
         callback=_sweeps,
-        help="Solve for so many values of a parameter; several sweeps go in pairs.",
+        help="Solve for COUNT values of a parameter; several sweeps go in pairs.",
     )
     return sweep(product(command))
 

@@ -84,7 +84,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer a request."""
-        # A name that another site makes point here (DNS rebinding) is none of this server's.
+        # A name of another site that points here (DNS rebinding) is not this server's.
         if self.headers.get_all("Host") not in self.server.names:
             self.send_error(HTTPStatus.FORBIDDEN, "This page is for this machine alone")
         elif self.path == "/":

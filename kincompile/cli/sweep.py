@@ -28,9 +28,7 @@ from kincompile.names import listed
 
 @click.command("sweep")
 @click.argument("model")
-@output_option(
-    "Folder to write: .zarr or .parquet; one that is there is gone on with.", required=False
-)
+@output_option("Folder to write: .zarr or .parquet; an existing one is resumed.", required=False)
 @page_option
 @motion_options
 @sweep_options

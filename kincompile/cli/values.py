@@ -40,8 +40,8 @@ def set_values(
 ) -> dict[str, float]:
     """Return the numbers that are set, angles in radians; the last counts of a name set twice.
 
-    Names are those of parameters or of columns, ``crank.phi`` or ``crank.phi_dot``. Every value
-    that is none is told.
+    Names are those of parameters or of columns, ``crank.phi`` or ``crank.phi_dot``. One message
+    lists every value that is not a number.
     """
     units: dict[str, str] = {item.name: str(item.unit) for item in model.parameters}
     pairs = [item.partition("=")[::2] for item in given]
@@ -112,7 +112,7 @@ def time_grid(
 def _last(
     model: Mechanism | ConstraintSystem, end: str | float | None, names: dict[str, float]
 ) -> float:
-    """Return the last time, NaN where it is none."""
+    """Return the last time, NaN if it is not a number."""
     if isinstance(end, str):
         return number(end, f"--end {end}: give a time", names)
     given = model.end_given if end is None else end

@@ -20,9 +20,11 @@ from kincompile.writing import require_writable
 @output_option(
     "Page to write, .html; a folder gets a page of each model, and index.html.", required=False
 )
-@click.option("--watch", is_flag=True, help="Show the page, anew when the model is saved.")
+@click.option(
+    "--watch", is_flag=True, help="Serve the page and reload it whenever the model is saved."
+)
 @motion_options
-@deg_option("Show angles in degrees until the page is told otherwise.")
+@deg_option("Show angles in degrees at first; the page can change it.")
 @click.pass_context
 def command(
     context: click.Context,

@@ -35,7 +35,7 @@ RUN = (
 
 
 def follow(model: str, options: Sequence[str]) -> None:
-    """Serve the page of a model, anew when a file is saved that it reads, until interrupted.
+    """Serve the page of a model until interrupted; reload it when a file it reads is saved.
 
     The options are those of `kincompile view` for its motion.
     """

@@ -1,7 +1,7 @@
 """One run of a watched model, in a process of its own, with a report of the files it has read.
 
 The run is that of the command line. A process of its own has every imported file as it is saved
-now, and ends when it is told to, whatever the model does.
+now, and can be ended at any time, whatever the model does.
 """
 
 from __future__ import annotations

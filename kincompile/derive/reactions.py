@@ -52,7 +52,7 @@ class Reactions:
 
 
 def multipliers(template: Template, size: int) -> tuple[ex.Symbol | ex.VectorSymbol, ...]:
-    """Return the multipliers of the row blocks of a type whose vectors have so many components."""
+    """Return the multipliers of the row blocks of a type with vectors of `size` components."""
     return tuple(
         ex.VectorSymbol(f"lambda_{k}", size)
         if isinstance(Phi, ex.Vector)

@@ -149,7 +149,7 @@ def _is_number(value: object) -> bool:
 def read_deviation(given: Any, where: str) -> Deviation:
     """Return a deviation that is given as one, as a number for both limits, or as two limits.
 
-    `where` begins the message where it is none.
+    `where` begins the message of an error.
     """
     if isinstance(given, Deviation):
         return given

@@ -99,7 +99,7 @@ def fit(
     search : {"sobol", "differential evolution"}
         How the sets are chosen: evenly spread over the bounds, or bred over generations.
     minimizer : {"SLSQP", "trust-constr"}
-        What ends a fit that has limits.
+        The solver of a fit with limits.
     seed
         Of the search: the result is the same on every run.
 
@@ -111,8 +111,9 @@ def fit(
     Raises
     ------
     InputError
-        If a parameter is none, bounds are the wrong way round or missing, a target names what there
-        is not, or the mechanism cannot be assembled within the bounds; all that is wrong at once.
+        If a parameter is unknown, bounds are the wrong way round or missing, a target names an
+        unknown column, or the mechanism cannot be assembled within the bounds. One message has
+        all problems.
     """
     begun = time.perf_counter()
     model = require_mechanism(model, "kc.fit")
@@ -151,7 +152,7 @@ def _rank(trial: Trial) -> tuple[bool, float]:
 
 
 def _targets(given: Any) -> list[Target]:
-    """Return the targets as a list; refuse what is none."""
+    """Return the targets as a list; refuse anything else."""
     kinds = (Passing, TimeRatio, Limit, Moves)
     found = [given] if isinstance(given, kinds) or not isinstance(given, Iterable) else list(given)
     problems = [
@@ -190,9 +191,11 @@ def _read_bounds(
         limits = given.get(name, known[name].range)
         rows.append(_checked_bounds(name, limits, problems))
         if name in fixed:
-            problems.append(f"{name!r} is to change and has a value in p: leave one of them out")
+            problems.append(
+                f"{name!r} is both a design variable and fixed in p; remove one of the two"
+            )
     if not names:
-        problems.append(f"no parameter of {model.name} may change: give bounds={{'a': (0.1, 2)}}")
+        problems.append(f"{model.name} has no design variables; give bounds={{'a': (0.1, 2)}}")
     if len(set(names)) < len(names):
         problems.append(f"parameters names one twice: {listed(names)}")
     if extra := [name for name in given if name in known and name not in names]:
@@ -423,8 +426,8 @@ def _nowhere(model: Mechanism, finder: Search) -> str:
     if finder.moved and (ratios := finder.demands.ratios):
         return (
             f"{model.name} moves through the times, but there is no "
-            f"{listed(item.title for item, _ in ratios)}: what has one rises and falls within the "
-            "times of the model, which are one cycle."
+            f"{listed(item.title for item, _ in ratios)}: a time ratio needs a column that rises "
+            "and falls once within the times of the model."
         )
     how_far = (
         "none could be assembled at the first time"

@@ -38,7 +38,7 @@ DIMENSIONS = ("parameter", "value", "unit", "before")
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """What a fit took."""
+    """Evaluation counts of a fit."""
 
     sampled: int  # sets of parameters that the search tried
     starts: int  # of them, those that were followed

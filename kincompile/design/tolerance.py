@@ -102,8 +102,8 @@ def tolerance(
     Raises
     ------
     InputError
-        If a name is that of no parameter, joint or column, a tolerance is none or moves nothing;
-        all that is wrong at once.
+        If a name is that of no parameter, joint or column, a tolerance is malformed or moves
+        nothing. One message has all problems.
     SolveError
         If the nominal mechanism does not move through all times.
     """
@@ -239,7 +239,7 @@ def _drawn(
 
 
 def _sets(nominal: Solution, sources: Sources, count: int, seed: int) -> dict[str, Array]:
-    """Return values of all parameters for each of so many samples."""
+    """Return values of all parameters for each of `count` samples."""
     size = max(1, (count - 1).bit_length())
     parts = qmc.Sobol(len(sources), seed=seed).random_base2(size)[:count]
     inside = np.clip(parts, np.finfo(float).eps, 1 - np.finfo(float).eps)

@@ -117,8 +117,8 @@ class ToleranceAnalysis(Shown):
             raise InputError(f"{self.name} was analysed without samples: give samples=1024.")
         if not len(self.drawn.values):
             raise InputError(
-                f"none of the {self.drawn.failed} samples of {self.name} moves through all times: "
-                "the tolerances are larger than it can bear."
+                f"none of the {self.drawn.failed} samples of {self.name} moves through all times. "
+                "Give smaller tolerances."
             )
         found: Array = self.drawn.values[..., k] - self.nominal[:, k]
         return found

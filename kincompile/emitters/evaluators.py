@@ -28,7 +28,7 @@ class UsedFrame:
 
 
 def frames_title(frames: Sequence[UsedFrame]) -> list[str]:
-    """Return the comment on what frames are; nothing where there are none."""
+    """Return the comment that explains frames; empty without frames."""
     return [f"body frames: A = {frame.formula}" for frame in frames[:1]]
 
 

@@ -46,7 +46,7 @@ def labelled(label: str, items: Iterable[str]) -> list[str]:
 
 
 def table(rows: Sequence[Sequence[str]], gap: int = 2) -> list[str]:
-    """Return rows with their columns aligned, so many blanks apart."""
+    """Return rows with their columns aligned, `gap` blanks apart."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return [
         (" " * gap)

@@ -99,7 +99,7 @@ def _calls(
 
 
 def _factors(plan: SolvePlan, variable: Collection[int]) -> tuple[int, ...]:
-    """Return what the solution for a right side reads of the values that Phi_q alone gives."""
+    """Return the values of Phi_q alone that the solution for a right side reads."""
     nodes = plan.nodes
     needed = count_uses(nodes, plan.solution).keys() & variable
     read = {k for node in needed for k in operands_of(nodes[node])}

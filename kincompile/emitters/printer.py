@@ -42,8 +42,7 @@ class Dialect:
 
     language: str  # its name, for messages
     functions: Mapping[str, str]  # text of each elementary function, with ``{}`` for the arguments
-    # pi, nan, square: the number pi; the number that is none; a square, which is a power or a
-    # function
+    # pi, nan, square: the number pi; not a number; a square, which is a power or a function
     pi: str = "pi"
     nan: str = "NaN"
     square: Operation = ("square({})", (SUM,), ATOM)

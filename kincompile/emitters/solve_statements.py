@@ -26,7 +26,7 @@ def solve_functions(
     """Return the functions that factor Phi_q and that solve Phi_q x = right, with what they are."""
     return [
         "",
-        "// What a solve needs of Phi_q, and the determinants of its blocks.",
+        "// Factor Phi_q; also return the determinants of its blocks.",
         *(f"// {line}" for line in explained(code, listing.plan)),
         *factor,
         "",
@@ -92,7 +92,7 @@ def operands(nodes: Iterable[int], printer: Printer) -> list[str]:
 
 
 def block_call(write: Statements, opened: str) -> Call:
-    """Return what solves a block by a call with arrays that gives an array, or its determinant.
+    """Return the printer of a block's solve, or of its determinant, as a call with arrays.
 
     `opened` is how a call begins, with its name, the block's size and the array of the matrix.
     """

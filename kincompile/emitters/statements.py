@@ -29,7 +29,7 @@ class Statements:
     entry: str
     plane: str = "[[c, -s], [s, c]]"  # how it writes the matrix A of a frame in the plane
     first: int = 0  # number of the first row
-    # continued, ending: what ends a line of a statement that goes on, and its last line
+    # continued, ending: the end of a line within a statement, and of its last line
     continued: str = ""
     ending: str = ";"
     time: str = ""  # what takes the time, where that is not given by itself

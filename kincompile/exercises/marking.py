@@ -166,14 +166,14 @@ def within_budget(
 
 def _in_a_process(work: Callable[[], dict[Blank, Mark]]) -> Any:
     """Return the outcome of a student's work in a process that ends at its budget."""
-    its, told = os.pipe()
+    reader, writer = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # the child starts no thread
         child = os.fork()
     if not child:
-        _work_and_tell(work, told)
-    os.close(told)
-    with os.fdopen(its, "rb") as stream:
+        _work_and_tell(work, writer)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as stream:
         answer = stream.read()
     os.waitpid(child, 0)
     if answer:
@@ -182,7 +182,7 @@ def _in_a_process(work: Callable[[], dict[Blank, Mark]]) -> Any:
     return "stopped", f"{took}; write shorter formulas"
 
 
-def _work_and_tell(work: Callable[[], dict[Blank, Mark]], told: int) -> NoReturn:
+def _work_and_tell(work: Callable[[], dict[Blank, Mark]], writer: int) -> NoReturn:
     """Do a student's work in the child process, and end it whatever happens."""
     import resource
 
@@ -191,7 +191,7 @@ def _work_and_tell(work: Callable[[], dict[Blank, Mark]], told: int) -> NoReturn
         resource.setrlimit(resource.RLIMIT_CPU, (used + SECONDS, used + SECONDS + 1))
         resource.setrlimit(resource.RLIMIT_AS, (_memory() + MOST_MEMORY,) * 2)
         answer = json.dumps(_outcome(work)).encode()
-        with os.fdopen(told, "wb") as stream:
+        with os.fdopen(writer, "wb") as stream:
             stream.write(answer)
     finally:
         os._exit(0)
@@ -260,7 +260,7 @@ def _lines(path: Path) -> tuple[list[str], str]:
 
 
 def _answers(lines: Sequence[str]) -> tuple[dict[str, str], dict[str, str]]:
-    """Return formulas by blank, and what is wrong with lines that name one."""
+    """Return formulas by blank, and the problems of lines that name one."""
     answers: dict[str, str] = {}
     unread: dict[str, str] = {}
     for line in lines:

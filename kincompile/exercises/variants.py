@@ -83,7 +83,7 @@ def variants(mechanism: Mechanism, count: int, seed: int, choices: Choices) -> l
             raise InputError(
                 f"{mechanism.name}: no variant was found for student {student} of {count} that "
                 "assembles, moves through its motion and differs from the others; ask for fewer "
-                "students, or give the model parameters that can vary by a quarter"
+                "students, or let the model bear changes of 25 % in its parameters"
             )
     return list(found.values())
 

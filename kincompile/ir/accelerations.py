@@ -54,8 +54,8 @@ def require_masses(code: InlineProgram) -> None:
     if light:
         have = "has" if len(light) == 1 else "have"
         raise StructuralError(
-            f"{code.program.name}: {listed(light)} {have} no mass, and how a body without mass "
-            "moves no force decides: give mass=... and inertia=... to m.body, however small."
+            f"{code.program.name}: {listed(light)} {have} no mass, and the motion of a body "
+            "without mass is undetermined. Give m.body mass=... and inertia=...; small ones do."
         )
 
 
@@ -179,7 +179,7 @@ class _Motion:
         """Return the rows whose squares are added to M, with their weights.
 
         They are those of coordinates without mass, and the norms of Euler parameters. The weight
-        makes what is added as large as the masses that the row connects.
+        makes the added terms as large as the masses that the row connects.
         """
         graph, program = self.graph, self._code.program
         mass = {x.row: x.node for x in self._code.entries("M") if x.row == x.column}

@@ -63,7 +63,7 @@ class Sizes:
     # By row and column; of an entry that is missing, its own number, or nothing where it varies.
     entries: dict[tuple[int, int], float] = field(default_factory=dict)
     scales: Mapping[int, float] = field(default_factory=dict)  # by column; 1.0 where it is missing
-    # What entries that vary are at that position, as far as it is known, with their signs.
+    # Values at that position of the entries that vary, with signs, as far as known.
     values: dict[tuple[int, int], float] = field(default_factory=dict)
 
     def of(self, graph: Graph, row: int, column: int, node: int) -> float:

@@ -70,7 +70,7 @@ class Graph:
         return self._intern(("pi",))
 
     def nan(self) -> int:
-        """Return the number that is none, for what has no value."""
+        """Return NaN, for a quantity without a value."""
         return self._intern(("nan",))
 
     def input(self, name: Hashable) -> int:

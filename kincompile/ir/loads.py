@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @cache
 def load_kernel(template: LoadTemplate, others: int, *, varies: bool) -> Kernel:
-    """Return the kernel of a type of load, whose values depend on so many other coordinates."""
+    """Return the kernel of a type of load whose values depend on a number of other coordinates."""
     environment = KernelEnvironment(template)
     expansion = Expansion(environment)
     found = derive_load(template, others, varies=varies)

@@ -131,7 +131,7 @@ def _kernel_mark(instance: Instance, kernels: dict[str, Kernel], first: str) -> 
 
 
 def _too_deep(constraint: Joint | FreeEquation) -> str:
-    """Return what to do about an expression that Python cannot walk through by recursion."""
+    """Return the remedy for an expression too deep for Python's recursion."""
     return (
         f"{constraint.name!r}: its expressions are nested too deeply, functions of functions of "
         "functions; give an inner part u a coordinate of its own, with the equation u - (inner "

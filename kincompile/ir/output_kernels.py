@@ -263,7 +263,7 @@ def _with_turns(graph: Graph, direction: Direction, turns: Iterable[Turn]) -> di
             continue  # one of the two vectors does not move across the other
         before, after = tangents(graph, [start, end], found)
         turned = graph.sub(after, before)
-        if sine is not None:  # the rate changes its sign with it, and there is none where it is 0
+        if sine is not None:  # the rate changes sign with the sine, and does not exist at 0
             sign = graph.div(sine, graph.call("sqrt", graph.square(sine)))
             found[sign] = graph.const(0)
             turned = graph.mul(sign, turned)

@@ -177,7 +177,7 @@ class Parameter:
 
 
 def default_values(parameters: Iterable[Parameter]) -> dict[str, float]:
-    """Return the default values that are numbers, of parameters that nobody has checked yet."""
+    """Return the default values that are numbers; the parameters need not be checked yet."""
     found = {}
     for item in parameters:
         with suppress(NotAnExpressionError):

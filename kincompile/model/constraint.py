@@ -123,7 +123,7 @@ class Element(Shown):
 
     @classmethod
     def further(cls) -> dict[str, str]:
-        """Return what its docstring says of its name and of arguments that all types share."""
+        """Return the texts of a docstring for the name and other arguments of all types."""
         return {"name": "Name of the load."}
 
 

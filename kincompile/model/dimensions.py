@@ -73,7 +73,7 @@ class _Given:
 def unit_problems(
     loads: Iterable[tuple[Load, Values]], units: Mapping[str, str], length_unit: str
 ) -> Iterator[str]:
-    """Yield what is wrong with the units of parameters that stand alone for attributes of loads."""
+    """Yield problems with the units of parameters that stand alone for attributes of loads."""
     found = [item for load, values in loads for item in _given(load, values, units)]
     length, _ = UNITS.get(length_unit, (math.nan, MASS))
     masses: dict[str, float] = {}

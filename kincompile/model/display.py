@@ -33,7 +33,7 @@ def constraints_html(
 
 
 def problems_html(name: str, problems: str) -> str:
-    """Return what is wrong with a mechanism that is not finished, as HTML."""
+    """Return the problems of an unfinished mechanism as HTML."""
     return f"<p><b>{escape(str(name))}</b>, not usable yet:</p><pre>{escape(problems)}</pre>"
 
 

@@ -264,7 +264,7 @@ def degrees_problem(value: object, unit: str) -> str | None:
 
 
 def evaluate(value: Scalar, values: dict[str, float]) -> float | None:
-    """Return the number an expression is at given values of its symbols; None where it is none."""
+    """Return the value of an expression at values of its symbols; None if it is not a number."""
     if not isinstance(value, sympy.Expr):
         return float(value)
     names = symbol_names(value)

@@ -50,7 +50,7 @@ class Gear(Constraint):
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:
-        """Return what is wrong with two radii that add to zero."""
+        """Return the problem of two radii that add to zero."""
         (first,), (second,) = numbers("R_i"), numbers("R_j")
         if first is None or second is None or first + second != 0:
             return None

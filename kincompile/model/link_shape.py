@@ -73,8 +73,7 @@ def shape(link: Outline) -> dict[str, Point]:
         used |= {frozenset((placed[0], other)) for other in placed[1:]}
     if surplus := [pair for pair in link.lengths if pair not in used]:
         raise ShapeError(
-            f"the lengths {listed_pairs(surplus, link.joints)} are more than fix its shape; leave "
-            "them out"
+            f"the link is over-dimensioned; remove the lengths {listed_pairs(surplus, link.joints)}"
         )
     return found
 

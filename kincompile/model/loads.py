@@ -117,7 +117,7 @@ class Spring(Load):
         "l_0", "Length without force [length]", "length", default=0
     )
     damping: ValueLike = argument.attribute("c", "Damping [force per velocity]", default=0)
-    force: ValueLike = argument.load("F", "What it pulls with beyond that [force]", default=0)
+    force: ValueLike = argument.load("F", "Further pull [force]", default=0)
 
     @classmethod
     def work(cls) -> tuple[Work, ...]:
@@ -128,7 +128,7 @@ class Spring(Load):
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:
-        """Refuse a negative length, and a spring that is none."""
+        """Refuse a negative length, and a spring without stiffness, damping or force."""
         (length,) = numbers("l_0")
         if length is not None and length < 0:
             return f"the free length is {length:g}; a length is not negative"
@@ -170,7 +170,7 @@ class TorsionSpring(Turning):
         "phi_0", "Angle without torque [rad]", "rad", default=0
     )
     damping: ValueLike = argument.attribute("c", "Damping [torque per rad/s]", default=0)
-    torque: ValueLike = argument.load("F", "What it turns back with beyond that", default=0)
+    torque: ValueLike = argument.load("F", "Further torque, against the turn [torque]", default=0)
 
     @classmethod
     def work(cls) -> tuple[Work, ...]:

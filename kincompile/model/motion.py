@@ -39,7 +39,7 @@ SHORTEST = 1e-12
 """Part of all times up to which one is as good as that before it."""
 
 RAMP = sympy.Rational(1, 4)
-"""The share of a rise that each ramp of the law "constant velocity" takes, unless told."""
+"""Default share of a rise that each ramp of the law "constant velocity" takes."""
 
 
 def law(title: str) -> type[Rise]:
@@ -123,8 +123,8 @@ def table(
     times, values
         Rising times and the value at each, three rows or more, numbers.
     velocities
-        At the first time and at the last; the motion goes on with them before and after, without
-        acceleration. Without, it begins and ends at rest.
+        At the first time and at the last; before and after these the motion keeps them, without
+        acceleration. By default it begins and ends at rest.
 
     Raises
     ------

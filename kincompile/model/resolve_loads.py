@@ -168,8 +168,8 @@ def _value(given: Any, where: str, name: str, occurring: set[str], scope: Scope)
         return 0 if value is None else value
     if highest_rate(value, where, scope) > 1:
         scope.problems.append(
-            f"{where}: {value} depends on accelerations, which follow from the forces; write it "
-            "with coordinates and rates, or give a body more mass"
+            f"{where}: a force cannot depend on accelerations, as {value} does; write it "
+            "with coordinates and rates, or model added mass as mass of a body"
         )
         return 0
     names = sorted(symbol_names(value) & scope.motion.keys())

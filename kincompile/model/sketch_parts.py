@@ -120,7 +120,7 @@ class Drawn:
         before = len(self.problems)
         if unknown:
             self.problems.append(
-                f"{what}: nobody drew the joints {listed(unknown)}"
+                f"{what}: unknown joints {listed(unknown)}"
                 f"{suggestion(unknown[0], self.joints)}; joints are: {listed(self.joints)}"
             )
         if len(set(names)) < len(names):
@@ -147,7 +147,7 @@ class Drawn:
         return default_values(self.mechanism.parameters)
 
     def _scalar(self, given: Any, what: str) -> Scalar:
-        """Return a number or an expression; note what is wrong with it, and go on with 1."""
+        """Return a number or an expression; note a problem with it, and take 1 instead."""
         try:
             value = as_expression(given)
         except NotAnExpressionError as error:
@@ -209,7 +209,7 @@ class Drawn:
         """Return a direction; note what is wrong with it."""
         found = self.place(given, what, expected)
         if all(number(part, self.values) == 0 for part in found):
-            self.problems.append(f"{what}: the direction {found} is none; {expected}")
+            self.problems.append(f"{what}: the direction {found} has zero length; {expected}")
         return found
 
     def line(self, joint: str, along: str | PointLike, on: BodyLike, what: str) -> Line | None:

@@ -46,7 +46,7 @@ class Begin:
 def first_position(inputs: Inputs) -> tuple[Inputs, Begin]:
     """Assemble the mechanism with the first set, or else with the parameters of the model.
 
-    It is found with care, and all sets are to be on its branch. Returns the inputs with those
+    The robust start finds it, and all sets are to be on its branch. Returns the inputs with those
     parameters and that position as the guess, as a chunk of a sweep has them.
     """
     time = float(inputs.t[0])
@@ -139,7 +139,7 @@ class Sets:
         equations = problem(inputs.code, self.p[variant], q, time)
         return March(equations, equations.engine, inputs.tolerance)
 
-    def strays(self, variants: Places, q: Array) -> Mask:
+    def left_branch(self, variants: Places, q: Array) -> Mask:
         """Say which may have been assembled, at positions (n, V), in another way than the first."""
         equations, begin = self.begin.equations, self.place
         found: Mask = is_elsewhere(equations, q, begin)
@@ -177,7 +177,7 @@ class Sets:
         if new.size:
             found = self.march(new).correct_together(q[:, new], time, inputs.max_iterations)
             point, iterations[new], good[new] = found.point, found.iterations, found.good
-            q[:, new], on_branch[new] = point.q, found.good & ~self.strays(new, point.q)
+            q[:, new], on_branch[new] = point.q, found.good & ~self.left_branch(new, point.q)
         lost, crosses = np.flatnonzero(~on_branch), np.zeros(count, dtype=bool)
         if lost.size and self.begin.is_assembled:
             led = lead_together(inputs, self.begin.equations, self.begin.q, self.p[lost])

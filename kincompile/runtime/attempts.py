@@ -23,7 +23,7 @@ from kincompile.criteria import (
 )
 from kincompile.runtime.engine.planned import Planned, stacked
 from kincompile.runtime.engine.scales import weights_of
-from kincompile.runtime.start import begins, mirrored
+from kincompile.runtime.start import mirrored, restart_points
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,7 +45,7 @@ def safeguarded(
     has a planned solve.
     """
     pattern, times = _pattern_of(equations.code), np.broadcast_to(t, len(sets))
-    found, (first, *others) = np.full_like(guesses.T, np.nan), begins(equations, guesses)
+    found, (first, *others) = np.full_like(guesses.T, np.nan), restart_points(equations, guesses)
     most = max(1, MOST_NUMBERS // equations.place.size**2)
     for some in ([first], others):
         left = np.flatnonzero(np.isnan(found[0]))
@@ -76,8 +76,8 @@ def other_sides(equations: Problem, sets: Array, t: float, q: Array) -> Array:
 
 
 PATIENT, FALLING = 3, 0.9
-"""Over so many steps a residual must fall to this part of itself: else it is at a minimum, around
-which it goes to and fro."""
+"""Over `PATIENT` steps a residual must fall to this part of itself. Otherwise the iteration
+oscillates around a minimum."""
 
 STATIONARY = 0.1
 """Part of itself by which the square of a residual falls at least, if equations are linear: less

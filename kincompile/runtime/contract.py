@@ -43,7 +43,7 @@ MARKS: Mapping[Part, str] = {
     "loads": "LOADS",
     "motion": "forward_dynamics",
 }
-"""What modules have that have quantities of such parts."""
+"""By which name a module shows that it has the quantities of a part."""
 
 
 def present_in(names: Container[str]) -> tuple[Quantity, ...]:

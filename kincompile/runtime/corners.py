@@ -36,7 +36,7 @@ ENTRIES = 1_000_000
 def corners_of(inputs: Inputs) -> Mask | None:
     """Return at which times a driver has a corner, shape (N,), of B variants (B, N).
 
-    None where there are none, or the model allows none.
+    None if no time has one, or the model allows no corners.
     """
     if not inputs.code.corners:
         return None

@@ -32,7 +32,7 @@ from kincompile.criteria import (
     TOLERANCE,
 )
 from kincompile.runtime.engine.dense import unsolvable
-from kincompile.runtime.engine.scales import crawls, norm, weights_of
+from kincompile.runtime.engine.scales import converges_linearly, norm, weights_of
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def iterate(
             attempt.status = Status.CONVERGED
             break
     else:
-        if crawls(attempt.corrections) and equations.holds(
+        if converges_linearly(attempt.corrections) and equations.holds(
             attempt.last, RESIDUAL_FACTOR * tolerance
         ):
             attempt.status = Status.SINGULAR

@@ -68,7 +68,7 @@ class Motion:
 
     @classmethod
     def over(cls, inputs: Inputs, *count: int) -> Motion:
-        """Make the arrays for a time grid, or for so many motions over it, with nothing reached."""
+        """Make the arrays for a time grid, or for several motions over it, with nothing reached."""
         n, shape = inputs.guess.size, (inputs.t.size, *count)
         if count or inputs.code.blocks:
             states = np.empty((3, shape[0], n, *count)).swapaxes(1, 2)
@@ -132,25 +132,25 @@ def follow(
 ) -> tuple[Motion, Outcome]:
     """Go through the grid up to its end, or to the first point that fails.
 
-    What ends a motion is found and noted; with `inputs.smooth` it goes on past a bifurcation. Who
-    tries many mechanisms, of which some do not get through, need not wait for why.
+    The event that ends a motion is located and noted; with `inputs.smooth` the motion continues
+    past a bifurcation. `explains=False` skips locating it: searches over many mechanisms use that.
     """
     motion = Motion.over(inputs)
-    way = _Way(inputs, motion, progress)
-    outcome = way.start()
-    if inputs.method is None and way.march_compiled(outcome):
+    continuation = _Continuation(inputs, motion, progress)
+    outcome = continuation.start()
+    if inputs.method is None and continuation.march_compiled(outcome):
         return motion, outcome
-    outcome = way.run(outcome)
+    outcome = continuation.run(outcome)
     while explains and outcome.status is not Status.CONVERGED:
-        outcome, passage = way.explain(outcome)
+        outcome, passage = continuation.explain(outcome)
         if passage is None or not inputs.smooth:
             break
-        outcome = way.run(way.go_through(passage))
-    way.end()
+        outcome = continuation.run(continuation.go_through(passage))
+    continuation.end()
     return motion, outcome
 
 
-class _Way:
+class _Continuation:
     """How far a motion was followed: `index` is the next point, found by `march`."""
 
     _march: March
@@ -169,7 +169,7 @@ class _Way:
             outcome = start(self._march, time, inputs)
         self._put(outcome)
         self._motion.is_folded = outcome.is_folded
-        if self._may_be_dense and (outcome.strays or outcome.other):
+        if self._may_be_dense and (outcome.left_branch or outcome.other):
             self._motion.note = self._doubt(outcome, time)
         if outcome.position is not None:
             # The guess may be rough: from here on the assembled mechanism gives the size.
@@ -178,7 +178,7 @@ class _Way:
 
     def _doubt(self, outcome: Outcome, time: float) -> str:
         """Say that the position found from the guess may not be the one that is meant."""
-        said, bodies = [DOUBTS["strays"]] if outcome.strays else [], ""
+        said, bodies = [DOUBTS["strays"]] if outcome.left_branch else [], ""
         if outcome.other is not None and outcome.position is not None:
             away = outcome.other.q - outcome.position.q
             said.append(DOUBTS["other"])
@@ -375,7 +375,7 @@ class _Way:
         return bool(away <= SMALL_ERROR)
 
     def _take_up(self, count: int) -> Outcome:
-        """Take so many points of the grid; return the last as one to go on from."""
+        """Accept points of the grid; return the last one, from which the march continues."""
         motion, stop = self._motion, self._index + count
         last = stop - 1
         motion.status[self._index : stop] = Status.CONVERGED

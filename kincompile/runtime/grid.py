@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from kincompile.runtime.march import State
 
 BLOCK = 45_000
-"""Coordinates of points at a time: so many that what is done once for all costs little, so few that
-intermediate arrays stay in the cache."""
+"""Coordinates of points at a time: enough for the cost of a call not to count, few enough for the
+intermediate arrays to stay in the cache."""
 
 LARGEST_DISPLACEMENT = 1e-3
 """Distance from the interpolation, in radians or sizes of the mechanism, that is still trusted."""

@@ -175,7 +175,7 @@ def read_inputs(
     """Check all inputs of the solver and bring them into the form in which it uses them.
 
     There may be several parameter sets unless `product` is None, and degrees of freedom that no
-    equation determines with `may_move`. All that is wrong with the values is told at once, by name.
+    equation determines with `may_move`. One message lists every wrong value, by name.
     """
     _require_module(module)
     code = code_of(module)

@@ -100,7 +100,7 @@ class Outcome:
     nearest: Point | None = None
     jumps: bool = False  # whether the mechanism is assembled there: it could only jump to it
     exhausted: bool = False  # whether the sub-steps on the way were too many
-    strays: bool = False  # whether it was assembled on another branch than its guess shows
+    left_branch: bool = False  # whether it was assembled on another branch than its guess shows
     is_folded: bool = False  # whether the guess that it was assembled from shows no branch
     other: Point | None = None  # another assembly that is as near to that guess
 
@@ -188,7 +188,7 @@ class March:
         return Corrected(point, good & done & equations.holds(point, self._residual), iterations)
 
     def complete(self, point: Point, before: State | None = None) -> tuple[State, Checks]:
-        """Solve for velocity and acceleration; say where all is as it must be, and what it is else.
+        """Solve for velocity and acceleration; return the checks of a point, with their statuses.
 
         A third right side, of the size of the equations' own terms, shows how near to singular
         Phi_q is. Where no determinant has halved since that was last looked at, it is no nearer.
@@ -200,8 +200,8 @@ class March:
             sensitivity, probed = before.sensitivity, before.probed
         if probed is None or not (np.abs(determinants) >= SAME_DETERMINANT * probed).all():
             probed = np.abs(determinants)
-            besides = column(equations.magnitude * equations.probe, point.q)
-            rates = engine.solved(equations, point, besides)
+            extra_rhs = column(equations.magnitude * equations.probe, point.q)
+            rates = engine.solved(equations, point, extra_rhs)
             sensitivity = equations.extent(rates.movement)
         else:
             rates = engine.solved(equations, point)
@@ -215,7 +215,7 @@ class March:
         return State(point.t, point, *numbers), checks
 
     def state(self, point: Point, before: State | None = None) -> State | Status:
-        """Return a position as a state of the motion, or say why it is none."""
+        """Return a position as a state of the motion, or the status of the first check it fails."""
         state, checks = self.complete(point, before)
         status = next((failed for good, failed in checks if not good), None)
         if status is Status.SINGULAR and unsolvable(point) is Status.NOT_FINITE:
@@ -359,7 +359,7 @@ class March:
             whole = abs(step) >= abs(t - state.t)
             outcome = self.step(state, t if whole else state.t + step, most)
             iterations += outcome.iterations
-            # A state that is too near already may be gone away from, but not towards singularity.
+            # Steps may move away from a near-singular state, but not closer to the singularity.
             too_near = max(TOO_NEAR, state.sensitivity)
             near = outcome.state is not None and outcome.state.sensitivity > too_near
             status = Status.SINGULAR if near and not whole else outcome.status

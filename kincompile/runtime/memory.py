@@ -24,10 +24,9 @@ points of a four-bar, nearly 64 MiB, takes 1.4 times as long in NumPy, and 2.4 t
 KEPT = 4
 """Pieces of memory that are kept at most: the matrices of four calls."""
 
-# The C library gives blocks back to the system until one as large was freed; from then on it keeps
-# as many bytes. So one of 32 MB, its largest, is freed at once: no page of it is ever touched.
-# The pieces kept here are never freed, so that nothing else would do it: without, `kinematics` of
-# 100,000 points takes 1.2 times as long in NumPy, and 1.3 times in C.
+# glibc raises its threshold for mmap to the size of the largest freed block. Freeing one of 32 MB,
+# its limit, at import keeps later results on the heap; no page of it is touched. Without this
+# `kinematics` of 100,000 points takes 1.2 times as long in NumPy, and 1.3 times in C.
 np.empty(4_000_000)
 
 free: deque[Bytes] = deque(maxlen=KEPT)
@@ -62,7 +61,7 @@ def empty(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]
 
 
 def _taken(size: int) -> Bytes:
-    """Return so many bytes at least: free ones that are not far too many, or new ones."""
+    """Return a block of at least this size: a free one of up to twice the size, or a new one."""
     # Every operation on the deque is atomic: threads may miss a piece and never share one.
     for _ in range(len(free)):
         try:

@@ -34,7 +34,7 @@ from kincompile.criteria import (
 from kincompile.runtime.corrector import Attempt, iterate, safeguarded_step
 from kincompile.runtime.engine.dense import LARGEST_CAREFUL, Dense
 from kincompile.runtime.engine.planned import Planned, stacked
-from kincompile.runtime.engine.scales import crawls
+from kincompile.runtime.engine.scales import converges_linearly
 from kincompile.runtime.march import March, Outcome
 from kincompile.runtime.status import Status
 
@@ -64,11 +64,11 @@ def start(march: March, t: float, inputs: Inputs, *, is_in_vain: bool = False) -
     folded = is_folded(march.equations, guess, point)
     state = march.state(point)
     # Towards a singular position Newton's method creeps, and ends a rounding error before it.
-    if not isinstance(state, Status) and crawls(attempt.corrections):
+    if not isinstance(state, Status) and converges_linearly(attempt.corrections):
         state = Status.SINGULAR if state.sensitivity > TOO_NEAR else state
     found = Outcome(
         Status.CONVERGED, iterations, None, point,
-        strays=left, is_folded=folded, other=attempt.other,
+        left_branch=left, is_folded=folded, other=attempt.other,
     )  # fmt: skip
     if isinstance(state, Status):
         return replace(found, status=state)
@@ -78,7 +78,7 @@ def start(march: March, t: float, inputs: Inputs, *, is_in_vain: bool = False) -
 def give_up(
     march: March, outcome: Outcome, t: float, inputs: Inputs, *, is_in_vain: bool = False
 ) -> Outcome:
-    """Find out what is there at a time that the motion does not reach."""
+    """Look for a position at a time that the motion does not reach."""
     assert outcome.state is not None
     if outcome.exhausted:
         return outcome
@@ -107,8 +107,8 @@ def assemble(
 ) -> Attempt:
     """Find a position from a guess: plain Newton, and safeguarded where that fails or strays.
 
-    What is near the guess comes first, the nearest of it; then what is not far, then what is on the
-    branch that the guess shows, then the nearer. Angles that the equations leave free by whole
+    Candidates are ranked: near the guess, by distance; not far from it; on the branch that the
+    guess shows; then by distance. Angles that the equations leave free by whole
     turns are those nearest to the guess. Where safeguarded attempts are known to be in vain, none
     is made.
     """
@@ -133,9 +133,9 @@ def assemble(
         return plain
     is_sound = found and not is_thrown(equations, plain.points)
     good = [plain] if found else []
-    if not is_sound or strays(equations, plain.points[0], plain.last):
+    if not is_sound or left_branch(equations, plain.points[0], plain.last):
         attempts = []
-        for begin in (guess,) if is_sound else begins(equations, guess):
+        for begin in (guess,) if is_sound else restart_points(equations, guess):
             attempts.append(iterate(equations, t, begin, *limits, safeguarded_step))
             if attempts[-1].status is Status.CONVERGED:
                 break
@@ -222,10 +222,10 @@ def _covered(equations: Problem, t: float, point: Point, guess: Array, tolerance
     return point
 
 
-def begins(equations: Problem, guess: Array) -> list[Array]:
-    """Return where safeguarded attempts begin: a guess, and further and further away around it.
+def restart_points(equations: Problem, guess: Array) -> list[Array]:
+    """Return where safeguarded attempts begin: a guess, and points further and further from it.
 
-    With all bodies on a line no equation tells which way to bend: so it is for zeros.
+    With all bodies on a line, as with zeros, Phi_q gives no direction in which to bend.
     """
     bends = (np.roll(equations.probe, k)[: guess.shape[-1]] for k in range(RESTARTS))
     nudges = (k * NUDGE * equations.reference * bend for k, bend in enumerate(bends, start=1))
@@ -238,7 +238,7 @@ def _is_careful(equations: Problem) -> bool:
     return is_written or equations.place.size > LARGEST_CAREFUL
 
 
-def strays(equations: Problem, guess: Point, found: Point) -> bool:
+def left_branch(equations: Problem, guess: Point, found: Point) -> bool:
     """Say whether a position found from a guess is not what the guess shows."""
     is_far = equations.is_far(found.q, guess.q) or equations.away(found.q, guess.q) > ASTRAY
     return bool(is_far) or leaves_branch(equations, guess, found)
@@ -258,7 +258,7 @@ def is_folded(equations: Problem, guess: Point, found: Point) -> bool:
 
 
 def is_settled(equations: Problem, way: Sequence[Point]) -> bool:
-    """Say whether a way led from a guess to an assembly so near that no nearer one is sought.
+    """Say whether the iterates stayed near enough to the guess to skip searching for another one.
 
     In compiled code it must not have gone far: where it ends then, rounding would decide.
     """

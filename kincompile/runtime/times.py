@@ -57,7 +57,7 @@ def times_at(
     Raises
     ------
     InputError
-        When there is no such column, it turns round or stands still, or does not reach a value.
+        When there is no such column, it is not monotonic, or does not reach a value.
     """
     problems: list[str] = []
     given = real_numbers("the list of values", values, problems)
@@ -97,10 +97,10 @@ def _one_way(known: Solution, name: str, wanted: Array) -> tuple[Array, Array]:
     steps = np.diff(column)
     if not (steps.size and ((steps > 0).all() or (steps < 0).all())):
         turn = times[:-1][np.sign(steps) != np.sign(steps[:1])]
-        where = f"at about t = {turn[0]:.6g}" if turn.size else "at once"
+        where = f"at about t = {turn[0]:.6g}" if turn.size else "at any time"
         raise InputError(
-            f"{known.name}: {name} turns round or stands still {where}, so that it does not tell "
-            "the time; look between two times where it goes one way"
+            f"{known.name}: {name} is not monotonic {where}, so it cannot be inverted for "
+            "time. Look between two times where it goes one way."
         )
     low, high = sorted((column[0], column[-1]))
     rounding = ROOT_LENGTH * max(abs(low), abs(high))

@@ -50,11 +50,11 @@ LEFT = (
     "No position was found on the branch of the first set: along the line of parameters from it a "
     "bifurcation or a lock-up comes first. Solve it alone, with a guess of its own."
 )
-"""What is said of a variant that is not on the branch of the first set."""
+"""The message of a variant that is not on the branch of the first set."""
 
 
 def _over(inputs: Inputs, count: int) -> Motion:
-    """Make the arrays for so many variants."""
+    """Make the arrays for a number of variants."""
     points, n = inputs.t.size, inputs.guess.size
     what = f"{count:,} variants at {points:,} times have {24e-9 * points * n * count:,.1f} GB"
     with memory_for(what, "give fewer at a time; kc.sweep takes them in chunks"):
@@ -139,7 +139,7 @@ class _Chunk:
             return
         everyone = np.arange(len(self._p))
         status, q = self._marched(everyone, self._begin.q)
-        elsewhere = (status[0] != Status.CONVERGED) | self._sets.strays(everyone, q)
+        elsewhere = (status[0] != Status.CONVERGED) | self._sets.left_branch(everyone, q)
         self._go_on(everyone[~elsewhere])
         if elsewhere.any():
             motions = Motion.over(self._inputs, int(elsewhere.sum()))
@@ -176,7 +176,7 @@ class _Chunk:
     def _go_on(self, variants: Places) -> None:
         """Take those variants on that the compiled march has left on their way."""
         status = self._motions.status[:, variants]
-        # What ends at a lock-up is no failure of that march.
+        # A lock-up ends a motion: the march has not failed.
         failed = status.any(axis=0) & ~(status == Status.LOCK_UP).any(axis=0)
         if failed.any():
             self._finish(self._known(variants[failed], (status[:, failed] != 0).argmax(axis=0)))

@@ -61,9 +61,9 @@ UNREACHED = (Status.NOT_CONVERGED, Status.NOT_ASSEMBLED, Status.LOCK_UP)
 
 
 def finite(solution: Solution) -> Solution:
-    """Take no point for converged whose numbers are not all finite, whatever has found it.
+    """Take no point for converged whose numbers are not all finite, whichever march found it.
 
-    The compiled march adds up each point itself; its results are in no cache any more.
+    The compiled march has checked its points; a second check would read them from memory again.
     """
     if solution.statistics.get("compiled") == solution.t.size:
         return solution

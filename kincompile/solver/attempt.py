@@ -1,7 +1,7 @@
 """An attempt at a position: how equations are judged around a guess, and Newton's method.
 
 Its steps are plain ones, or safeguarded where those fail or stray. The second text that the solvers
-of languages print; `start` goes on with it. It is read as the march is, and works on one point, the
+of languages print; `start` builds on it. It is read as the march is, and works on one point, the
 first lane.
 """
 
@@ -169,7 +169,7 @@ def fill_matrix(scale: Row[N], terms: Row[M], b: Point, s: Start):
 
 
 def solve_least(s: Start, count: Count) -> Bool:
-    """Find the step by which so many rows miss least (Householder); return whether there is one."""
+    """Find the least-squares step of `count` rows (Householder); return whether one exists."""
     total: Real = 0.0
     for k in range(N):
         square: Real = 0.0
@@ -201,7 +201,7 @@ def solve_least(s: Start, count: Count) -> Bool:
 
 
 def plain_step(q: Row[N], b: Point, s: Start) -> Int:
-    """Apply the whole correction to a position; return CONVERGED, or why there is none."""
+    """Apply the whole correction to a position; return CONVERGED, or the reason for failing."""
     trial = row(N)
     for i in range(N):
         trial[i] = 1.0

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 
 MARCH, START = ("step", "march"), ("attempt", "start")
-"""The modules of a text, each of which goes on with the ones before."""
+"""The modules of a text; each builds on the ones before."""
 
 
 @cache
@@ -78,9 +78,9 @@ def source_of(name: str) -> str:
 
 
 def read(source: str, known: Text | None = None, *, is_careful: bool = False) -> Text:
-    """Return the structs and functions of a source; a `Refused` names the line that is none.
+    """Return the structs and functions of a source; a `Refused` names what is not in it.
 
-    It goes on with those that are known.
+    Those of an earlier text may be used.
     """
     text = Text({**known.structs}, {**known.functions}) if known else Text({}, {})
     tree, left_out = chosen(source, is_careful=is_careful)
@@ -283,7 +283,7 @@ class _Statements:
     def assign(
         self, item: ast.stmt, target: Expression, operation: str, value: Expression
     ) -> Statement:
-        """Return an assignment to what there is."""
+        """Return an assignment to an existing variable."""
         into, kind = target.type, value.type
         if isinstance(target, Name):
             is_counted = target.variable.below is not None

@@ -152,8 +152,8 @@ def leaves_branch(q: Row[N], b: Point, s: Start) -> Bool:
 def take(b: Point, s: Start, a: Attempt, other: Attempt, best: Attempt):
     """Take an attempt that converged as the best one, where it is nearer to what a guess means.
 
-    What is near the guess comes first, the nearest of it; then what is not far, then what is on its
-    branch, then the nearer.
+    Candidates are ranked: near the guess, by distance; not far from it; on its branch; then by
+    distance.
     """
     unwind(s.meant, b, s, a, other)
     away = away_from(a.q, s.meant, s)
@@ -283,7 +283,7 @@ def is_settled(s: Start, a: Attempt) -> Bool:
 def rescue(is_sound: Bool, most: Int, b: Point, s: Start, a: Attempt, best: Attempt):
     """Make safeguarded attempts until one converges: from the guess, then further and further away.
 
-    With all bodies on a line no equation tells which way to bend. Where a position was found
+    With all bodies on a line Phi_q gives no direction in which to bend. Where a position was found
     already, one is enough; else the best one ends as the attempt that misses the equations least.
     """
     begin = row(N)
@@ -309,7 +309,7 @@ def rescue(is_sound: Bool, most: Int, b: Point, s: Start, a: Attempt, best: Atte
 
 
 def find_position(guess: Row[N], most: Int, b: Point, s: Start, best: Attempt):
-    """Find a position from a guess, or why there is none, judged by what was found around one."""
+    """Find a position from a guess, or the reason for failing, by scales measured around one."""
     plain = Attempt()
     a = Attempt()
     other = Attempt()
@@ -349,7 +349,7 @@ def find_position(guess: Row[N], most: Int, b: Point, s: Start, best: Attempt):
 
 
 def position_from(guess: Row[N], size: Real, most: Int, b: Point, s: Start, best: Attempt):
-    """Find a position from a guess, or why there is none, for a size of the mechanism."""
+    """Find a position from a guess, or the reason for failing, for a size of the mechanism."""
     s.meant = guess
     orient(s)
     near = copied(s.meant)

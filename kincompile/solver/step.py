@@ -1,12 +1,12 @@
-"""A step of the march: the text that the solvers of all languages print. `march` goes on with it.
+"""A step of the march: the text that the solvers of all languages print. `march` builds on it.
 
 It runs on NumPy (`words.on_numpy`), and `reader.read` reads it. A `Lane` is a number of each of the
 points that are worked on together: an array in NumPy and C, a plain number where a language takes
 one point at a time. `Rows[N]` are N of them. A `Real` is the same for all. Nothing that differs
 from lane to lane decides an `if`: `where` chooses, `any_lane` asks all.
 
-What `IS_CAREFUL` chooses is the march that has the last word, with the rules of the runtime's: it
-goes as near to a singular position as rounding lets it. The other one hands over to it.
+`IS_CAREFUL` chooses the march that has the last word, with the rules of the runtime's: it goes as
+near to a singular position as rounding allows. The plain march hands over to it.
 """
 
 from __future__ import annotations

@@ -68,7 +68,7 @@ TABLES = {
 }
 """Which coordinates are angles, which equations repeat others, numbers without a pattern (as many
 as there are coordinates or equations), the row and column of each entry of Phi_q; which coordinates
-are angles or may be, and of each the first of its body's Euler parameters (N: it is none)."""
+are angles or may be, and of each the first of its body's Euler parameters (N: not one)."""
 
 CONSTANTS = (
     dict.fromkeys((*SIZES, *ROOM, *STATUSES, *COUNTS, *START_COUNTS, *CAREFUL_COUNTS), INT)
@@ -76,7 +76,7 @@ CONSTANTS = (
     | dict.fromkeys(("NOTHING", "INFINITE", "TURN"), REAL)
     | TABLES
 )
-"""Names that have one value. `NOTHING` is the number that is none, `TURN` a whole one."""
+"""Names that have one value. `NOTHING` is not a number, `TURN` a whole turn."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -109,7 +109,7 @@ class Struct:
         vars(self).update(given)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Fill an array, or set what is none."""
+        """Fill an array, or set a number."""
         here = vars(self).get(name)
         if isinstance(here, np.ndarray):
             here[...] = value

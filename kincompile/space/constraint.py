@@ -35,7 +35,7 @@ class SpatialConstraint(Constraint):
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:
-        """Return what is wrong with a cross that lies along its axis."""
+        """Return the problem of a cross that lies along its axis."""
         for index in "ij":
             with suppress(KeyError):
                 h, f = (np.array(numbers(f"{key}_{index}"), dtype=float) for key in "hf")

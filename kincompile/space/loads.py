@@ -142,7 +142,7 @@ class TorsionSpring(loads.TorsionSpring, Crosses):
 
     @staticmethod
     def problem(numbers: Numbers) -> str | None:
-        """Refuse a cross along its axis, and a spring that is none."""
+        """Refuse a cross along its axis, and a spring without effect."""
         return SpatialConstraint.problem(numbers) or loads.TorsionSpring.problem(numbers)
 
 

@@ -114,7 +114,7 @@ class Mechanism(PlanarMechanism):
 
 
 def _flat(position: Any) -> tuple[Scalar, ...]:
-    """Return the components of a position; what is none keeps its place, and is refused later."""
+    """Return the components of a position; anything else is kept, and refused later."""
     try:
         return tuple(position)
     except TypeError:

@@ -171,8 +171,8 @@ class Sketch(Drawing[SpatialBody]):
         first, *others = joints
         if len(others) > 1:
             self._drawn.problems.append(
-                f"link {link.body.name!r} shares {listed(joints)} with {other.body.name!r}, which "
-                "three joints hold fast; two are a hinge, or make one link of the two"
+                f"link {link.body.name!r} shares {listed(joints)} with {other.body.name!r}, and "
+                "three shared joints lock the two links; share two (a hinge), or merge the links"
             )
         axis = self._axes.get(first)
         if others:

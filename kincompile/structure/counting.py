@@ -22,7 +22,7 @@ LEFT_FREE = (
     "; or leave them free: kc.simulate gives the motion that follows from its masses and forces, "
     "kc.equilibrium where it rests"
 )
-"""What else is to be done with a mechanism that has loads."""
+"""The alternative to more drivers for a mechanism with loads."""
 
 
 def unmatched(system: ConstraintSystem, pattern: Pattern) -> tuple[list[str], list[str]]:

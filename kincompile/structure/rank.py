@@ -53,8 +53,8 @@ ON_MANIFOLD = 0.25
 """Part of such a step that assembling the joints may change: else it led to another branch."""
 
 MISSED = 10.0
-"""How many times what joints miss that cannot be assembled, rows that differ by it may be
-independent of the others."""
+"""Where joints cannot be assembled, rows that differ by up to this many times their residual may
+count as independent of the others."""
 
 UNSURE = math.sqrt(DEPENDENT)
 """What stands for `DEPENDENT` where no position is settled: each is wrong by the root of that."""

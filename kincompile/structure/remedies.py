@@ -1,4 +1,4 @@
-"""What to do about equations that depend on others, and about coordinates that nothing drives."""
+"""Remedies for redundant equations and for coordinates without a driver."""
 
 from __future__ import annotations
 

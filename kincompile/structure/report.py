@@ -38,7 +38,7 @@ def inspect_system(
     ranks: RankReport,
     missing: tuple[MissingDriver, ...],
 ) -> Inspection:
-    """Count what there is in a checked system.
+    """Count equations, coordinates and degrees of freedom of a checked system.
 
     Given are the pattern of its Phi_q, its rank, and the drivers that it lacks.
     """

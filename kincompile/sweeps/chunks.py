@@ -34,7 +34,7 @@ PER_WORKER = 2
 def solved(
     job: Job, plan: Plan, numbers: Iterable[int], executor: Executor | None, pending: int | None
 ) -> Iterator[tuple[int, Values]]:
-    """Give the number of each chunk when it is done, with its values if nobody has written them.
+    """Give the number of each chunk when it is done, with its values if they are not written yet.
 
     Without an executor they are solved in this process; without `pending` twice as many are under
     way as there are workers.

@@ -214,16 +214,16 @@ def require_same(path: Path, found: object, marks: Mapping[str, str], main: Path
     if not isinstance(found, dict):
         if main is not None:
             raise InputError(
-                f"{escaped(main)} is damaged, and what is left does not say that {shown} holds "
+                f"{escaped(main)} is damaged, and the rest does not say that {shown} holds "
                 "this sweep: give another name, or remove it."
             )
         raise InputError(
-            f"{shown} is there, and no sweep wrote it: give another name, or remove it."
+            f"{shown} exists and was not written by a sweep. Give another name, or remove it."
         )
     other = [name for name, mark in marks.items() if found.get(name) != mark]
     if other:
         raise InputError(
             f"{shown} holds another sweep: {listed(other)} "
             f"{'differs' if len(other) == 1 else 'differ'}. Give another name for this one, remove "
-            "that store, or go on with it as it was begun."
+            "that store, or resume it with the settings it was begun with."
         )

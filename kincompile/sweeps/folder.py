@@ -111,7 +111,7 @@ class Records:
         return self.path / self.place / str(name)
 
     def _text(self, files: Iterable[str]) -> str:
-        """Return a line for each file that is there: of a part without a value there is none."""
+        """Return a line for each existing file; a part without a value has none."""
         pairs = ((name, digest(self.path / name)) for name in files)
         return "".join(f"{found}  {name}\n" for name, found in pairs if found)
 
@@ -145,7 +145,7 @@ def opened(
     marks: Mapping[str, str],
     main: str,
 ) -> None:
-    """Make the folder of a sweep, or see to it that the one that is there is whole and its own.
+    """Make the folder of a sweep, or check that an existing one is whole and of this sweep.
 
     `make` fills a new folder, `marks_of` reads the marks of one, which its file `main` has.
     """
@@ -182,7 +182,7 @@ def moved(fresh: Path, path: Path) -> bool:
 
 
 def _mend(records: Records, fresh: Records) -> None:
-    """Write again what is damaged of the files that a folder was made with."""
+    """Rewrite damaged files of those that a folder was made with."""
     wanted, known = fresh.digests(BEGINNING), records.digests(BEGINNING)
     found = {name: digest(records.path / name) for name in wanted}
     others = [name for name in wanted if found[name] not in ("", wanted[name])]

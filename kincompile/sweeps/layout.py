@@ -125,7 +125,8 @@ def read_layout(
     """Read what is to be kept of a solution, which has one position and knows its columns.
 
     Without names of columns they are all outputs, of a model without any all coordinates, unless
-    there are measures of outputs, as ``"foot.x.stroke"``. Every name that means nothing is told.
+    there are measures of outputs, as ``"foot.x.stroke"``. All unknown names are
+    reported together.
     Forces are known where the solution is given with them too.
     """
     problems: list[str] = []
@@ -180,8 +181,8 @@ def _measure(solution: Solution, given: str, bearing: Solution | None) -> Kept:
         )
     if not is_force and column.name not in solution.observed.names:
         raise InputError(
-            f"{given!r}: {column.name} is no output, and measures are those of outputs. There are "
-            f"{listed(solution.observed.names)}: name a point or an output in the model."
+            f"{given!r}: {column.name} is a coordinate; measures are defined for outputs. There "
+            f"are {listed(solution.observed.names)}: name a point or an output in the model."
         )
     unit = TIME_UNIT if measure in OF_TIME else "" if measure == "time_ratio" else column.unit
     return Kept(f"{column.name}_{measure}", unit, column.name, measure, is_force)

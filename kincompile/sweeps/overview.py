@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from kincompile.sweeps.result import Sweep
 
 MOST_SHOWN = 2000
-"""Variants that are shown as dots, about: of more, some that are scattered among them."""
+"""Approximate number of dots; larger sweeps are subsampled."""
 
 HEADER = ("kept", "unit", "least", "at", "greatest", "where", "mean")
 
@@ -134,9 +134,9 @@ def overview(sweep: Sweep) -> Overview:
 
 
 def _scattered(first: int, count: int, part: float) -> NDArray[np.bool_]:
-    """Say which of so many variants in a row are shown, about a part of all.
+    """Say which of `count` variants in a row are shown, about a part of all.
 
-    Every so many would alias with a grid, and with the sequence of samples.
+    A regular choice would alias with a grid, and with the sequence of samples.
     """
     numbers = np.arange(first, first + count, dtype=np.uint64)
     mixed = (numbers * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32)

@@ -50,7 +50,7 @@ def _rows(seen: Overview, angle_unit: str) -> list[tuple[str, ...]]:
 
 
 def _statuses(sweep: Sweep) -> tuple[Block, ...]:
-    """Return how often each status is there, and what those mean that are no success."""
+    """Return the count of each status, with the meaning of the failures."""
     counts = sweep.statuses()
     rows = [(name, f"{count:,}") for name, count in counts.items()]
     said = [text(Verbatim(name), f": {what}") for name, what in explained(counts).items()]

@@ -28,7 +28,7 @@ VARIANT = "variant"
 class Grid:
     """The dimensions of a sweep, cut into chunks; it knows no values."""
 
-    sizes: dict[str, int]  # how long each dimension is, by name; time is none of them
+    sizes: dict[str, int]  # how long each dimension is, by name; without time
     most: int  # largest number of variants in a chunk
 
     @cached_property
@@ -122,5 +122,5 @@ class Plan:
 
 
 def chunk_size(coordinates: int, times: int) -> int:
-    """Return how many variants a chunk has where nobody says: so many that memory is bounded."""
+    """Return the default number of variants in a chunk, by which memory is bounded."""
     return max(1, min(MOST, NUMBERS // (3 * max(coordinates, 1) * times)))

@@ -58,7 +58,7 @@ LEGEND = (
 """The oracles, for readers of the table."""
 
 THE_MODEL = "the model"
-"""What Phi of a module that was compiled here is compared with."""
+"""The reference for Phi of a module that was compiled here."""
 
 SOLVE, DETERMINANTS, ALL_BLOCKS = "solve", "determinants", "all blocks"
 """What else is compared: the planned solve, equation by equation, and the determinants it gives."""

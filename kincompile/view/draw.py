@@ -122,7 +122,7 @@ def row_at(solution: Solution, t: float | None) -> int:
     if not abs(times[row] - t) <= SAME_TIME * (float(np.ptp(times)) or 1.0):
         raise InputError(
             f"the motion of {solution.name} is solved from t = {times.min():g} to "
-            f"{times.max():g}, and t = {t:g} is none of its {times.size} times; the nearest is "
+            f"{times.max():g}, and t = {t:g} is not among its {times.size} times; the nearest is "
             f"{times[row]:g}: give that one, or solve for times with t = {t:g} among them"
         )
     if not solution.good[row]:

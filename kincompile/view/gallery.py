@@ -39,7 +39,7 @@ FRAMES = 120
 """Approximate number of points of a motion in the gallery."""
 
 DRAWS = "return { View, drawShapes, paletteNow };"
-"""What the gallery takes of the scripts that draw."""
+"""The part of the drawing scripts that the gallery uses."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,7 +60,7 @@ def solver_script(model: Mechanism | ConstraintSystem) -> str:
 def forces_script(model: Mechanism | ConstraintSystem) -> str:
     """Return the script that declares `forces`: a module whose outputs are forces, or null.
 
-    There is none without loads, where redundant joints share them, and in large mechanisms.
+    None exists without loads, where redundant joints share them, and in large mechanisms.
     """
     system = model.system()
     program = None

@@ -313,7 +313,7 @@ def _pair(point: Iterable[float]) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a number of pixels or degrees, without what nobody sees."""
+    """Return a number of pixels or degrees, to 1/100."""
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 

@@ -208,7 +208,7 @@ function singularStart(equations, at) {
     return eventAt(equations, kind, at.q, at.t, at);
 }
 
-/* The event that ended a motion; null where it did not end, or nobody knows why. The failed point
+/* The event that ended a motion; null if it did not end, or for a reason unknown. The failed point
    gets its status: how Newton's method fails there rounding decides. */
 function explain(motion) {
     const { failed, status } = motion, event = failed && !failed.isExhausted ? endOf(motion) : null;

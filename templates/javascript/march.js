@@ -31,8 +31,8 @@ function completed(at, equations) {
     return found.status;
 }
 
-/* Follow the motion from a good point to a time, in sub-steps and with pivoting. `position` is what
-   was found at that time, `state` the last point to go on from. */
+/* Follow the motion from a good point to a time, in sub-steps and with pivoting. `position` is the
+   one found at that time, `state` the last point to go on from. */
 function advance(equations, from, t) {
     const at = spare(equations.p), last = spare(equations.p, equations), found = new_outcome();
     copy_state(at, from);
@@ -156,7 +156,7 @@ function start(model, p, guess, t) {
     };
 }
 
-/* What is there at a time that the motion does not reach. */
+/* Look for a position at a time that the motion does not reach. */
 function giveUp(equations, outcome, t) {
     const attempt = assembled(equations, t, outcome.state.q);
     const jumps = attempt.status === CONVERGED;

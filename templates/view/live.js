@@ -61,7 +61,7 @@ function listed(bodies) {
   return bodies.length > 12 ? `${shown} and ${bodies.length - 12} more` : shown;
 }
 
-/* What is to be said of a start that may not be the one that is meant. */
+/* A warning about a start on another branch than the guess may mean. */
 function doubtOf({ t, other, strays }) {
   const { words } = player.data, said = [strays && words.strays, other && words.other].filter(Boolean);
   const values = { t: brieflyNumber(t[0]), bodies: other && listed(other) };
@@ -366,7 +366,7 @@ const live = {
     try { history.replaceState(null, '', this.fragment() || ' '); } catch { /* so be it */ }
   },
 
-  /* Take the values of the page's address; names and numbers that are none are left out. */
+  /* Take the values of the page's address; unknown names and wrong numbers are left out. */
   readFragment() {
     const given = [...new URLSearchParams(location.hash.slice(1))]
       .map(([name, text]) => [name, text.trim() === '' ? NaN : Number(text)])

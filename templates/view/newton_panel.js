@@ -77,7 +77,7 @@ class NewtonPanel {
       if (go) moves[go]();
     });
     player.onChange(state => {
-      // A hidden panel takes the time when it is shown, of which it is told too.
+      // A hidden panel takes the time when it is shown, which is also reported here.
       if (this.isShown && (state.time !== this.t || live.motion !== this.solved)) this.start(this.guess);
     });
   }

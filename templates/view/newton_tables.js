@@ -3,7 +3,7 @@
 
 const newtonTables = (() => {
   const PLOT = { width: 340, height: 200, left: 34, right: 10, top: 10, bottom: 26 };
-  const LOWEST = -17;  // log10 of the smallest number that is told from zero
+  const LOWEST = -17;  // log10 of the smallest number that differs from zero
   const HIGHEST = 308;  // and of the largest one
   const MOST_DIGITS = 10;  // coordinates up to which a cell of Phi_q has room for its number
   const NEXT = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };

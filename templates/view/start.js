@@ -50,7 +50,7 @@ function showNote(state) {
   note.hidden = isGood;
   if (isGood) return;
   const shown = state.isFound ? '' : ' Shown is the last position that was found.';
-  // What ended the motion says more than that something did.
+  // The event that ended the motion, rather than the status alone.
   const [ended] = player.data.events.slice(-1), sentence = sentences[status[state.index]];
   const said = status[state.index] === 4 && ended ? `${splitSentence(sentence)[0]}, after ${inShort(ended)}.` : sentence;
   note.textContent = hasMotion()

@@ -1,5 +1,5 @@
 'use strict';
-/* What is shown beside a point or a body that is pointed at. */
+/* The tip beside the point or body under the pointer. */
 
 function showTip(state) {
   const tip = byId('tip'), target = stage.hovered || stage.selected;

@@ -1,8 +1,8 @@
 'use strict';
 /* Numbers as they are read: angles in radians or degrees, as many digits as are significant.
 
-   units.text(value, unit)   a number of a unit of the model; what is rounding beside the largest
-                             number of that unit in the motion is 0
+   units.text(value, unit)   a number of a unit of the model; rounding errors of the largest number
+                             of that unit in the motion are 0
    units.name(unit)          the unit it is shown in
    units.factor(unit)        and the factor from one to the other */
 

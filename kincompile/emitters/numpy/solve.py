@@ -35,7 +35,7 @@ def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     solve += f"return {solution}".split("\n")
     return [
         "def _factor(f, J):",
-        '    """Return what a solve needs of Phi_q, and the determinants of its blocks."""',
+        '    """Factor Phi_q; also return the determinants of its blocks."""',
         *(
             f"    {line}"
             for line in (

@@ -32,7 +32,7 @@ def list_texts(program: Program) -> dict[str, str]:
 
 
 def solvability_text(program: Program) -> str:
-    """Return what a module says of its solve where that is not the usual one, else nothing."""
+    """Return the lines of a module about its solve, empty if Phi_q is square and regular."""
     lines = []
     if program.redundant:
         names = tuple_text(f'"{name}"' for name in program.redundant)

@@ -70,7 +70,7 @@ class OctaveSolver(OneLane):
     def begin(self, own: Function | None = None) -> None:
         """Forget what is known of the function before."""
         self.own, self.used = own, dict[str, object]()
-        self.before: Lines = []  # what stands before the statement that is printed
+        self.before: Lines = []  # lines that must precede the statement
         self.taken = 0  # names that this statement has for parts of it
         self.from_one = set[object]()  # variables that count from 1
         self.entries: Entries | None = None  # that are worked on at once

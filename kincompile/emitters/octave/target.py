@@ -151,7 +151,7 @@ def _spline(name: str, spline: SplineTable) -> str:
 
 
 def _literal(text: str) -> str:
-    """Return a string and the sign that the next line goes on with it."""
+    """Return a string with the sign of continuation after it."""
     return "'" + text.replace("'", "''") + "' ..."
 
 

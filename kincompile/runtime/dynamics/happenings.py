@@ -30,9 +30,9 @@ SENTENCES = {
     PASSAGE: "{name} is {value:.6g} at t = {t}.",
     STOP: "{name} comes to its stop, {value:.6g}, at t = {t}, and the motion ends there.",
     SINGULAR: (
-        "Singular configuration at t = {t}: Phi_q loses rank there, so that no equation of "
-        "motion tells how {bodies} go on. Change a length slightly, begin anew beyond it, or go on "
-        "along the smooth branch with through='smooth'."
+        "Singular configuration at t = {t}: Phi_q loses rank there, and the equations of "
+        "motion do not determine how {bodies} continue. Change a length slightly, restart beyond "
+        "it, or continue along the smooth branch with through='smooth'."
     ),
     LOCK_UP: singular.SENTENCES[LOCK_UP],
 }

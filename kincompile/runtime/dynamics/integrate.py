@@ -105,7 +105,7 @@ class Integration:
         size = inputs.t.size
         # NaN where the motion was not reached.
         self.q, self.q_dot, self.q_ddot = np.full((3, size, equations.n), np.nan)
-        # Drift is the largest correction since the point before; so many are the steps.
+        # Drift is the largest correction since the point before.
         self.kinetic, self.work, self.drift, self.residual = np.full((4, size), np.nan)
         self.status = np.full(size, int(Status.NOT_REACHED))
         self.steps = np.zeros(size, dtype=np.int64)
@@ -314,9 +314,9 @@ class Integration:
         level = float(np.nanmax(np.abs(np.stack((self.kinetic, self.work)))))
         self.message = (
             f"{self._name}: {self.t.size} points by {self._total} steps of {self._method}. The "
-            f"energy is off by at most {np.abs(self.energy_drift).max():.2g} of {level:.3g}, the "
-            f"constraints by {self.residual.max():.2g}; what led back to them moved nothing by "
-            f"more than {self.drift.max():.2g}."
+            f"energy drifts by at most {np.abs(self.energy_drift).max():.2g} of {level:.3g}. The "
+            f"constraint residual is at most {self.residual.max():.2g}; projections moved no "
+            f"coordinate by more than {self.drift.max():.2g}."
         )
         for event in self.events:
             passed = f"Passed: {event.kind} at t = {event.t:.10g}."

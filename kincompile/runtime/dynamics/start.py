@@ -1,7 +1,7 @@
 """The state from which a motion begins: positions and velocities that the constraints allow.
 
 What is given is held. Of what is left open, coordinates are those nearest to the guess, and the
-velocities those of the least kinetic energy: what nobody sets in motion is at rest.
+velocities those of the least kinetic energy: a mechanism without given velocities is at rest.
 """
 
 from __future__ import annotations

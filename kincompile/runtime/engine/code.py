@@ -110,7 +110,7 @@ class Compiled:
     patterns: Mapping[str, NDArray[np.signedinteger[Any]]]  # as `pattern`, of each matrix
     has_loads: bool  # whether it has M, Q and their derivatives
     redundant: tuple[str, ...]  # names of the equations that repeat others, and agree with them
-    # Why the equations cannot determine the coordinates; "" where they can, or nobody says.
+    # Why the equations cannot determine the coordinates; "" if they can, or if unknown.
     unsolvable: str
     corners: bool  # whether its drivers may have corners
     lanes: LaneFunctions | None  # with the planned solve, where the module has one
@@ -146,12 +146,12 @@ class Compiled:
                 "form='inline'."
             )
         raise InputError(
-            f"the module of {self.name} was loaded from a file, which knows no more than its own "
-            f"functions: compile the model, {kind.then}."
+            f"the module of {self.name} was loaded from a file and contains only its own "
+            f"functions. Compile the model, {kind.then}."
         )
 
     def points(self) -> Compiled:
-        """Return what has the points of the joints as outputs; of a file what it has itself."""
+        """Return the code with the points of the joints as outputs; of a file the file's own."""
         return self.request(POINTS) if POINTS in self.makers else self
 
     def undriven(self) -> str:

@@ -59,11 +59,11 @@ class Dense(Linear):
         """Return Phi_q x - b."""
         return np.asarray(point.Phi_q @ x - b)
 
-    def rates(self, point: Point, besides: Array | None) -> Rates:
-        """Return the rates at a point, and x of Phi_q x = besides if that is asked for."""
+    def rates(self, point: Point, extra_rhs: Array | None) -> Rates:
+        """Return the rates at a point; with `extra_rhs` also x of Phi_q x = extra_rhs."""
         nothing = np.full(point.q.size, np.nan)
         sides = np.empty((point.Phi.size, 2))
-        sides[:, 1] = 0.0 if besides is None else besides  # a second right side costs nothing
+        sides[:, 1] = 0.0 if extra_rhs is None else extra_rhs  # a second right side costs nothing
         try:
             sides[:, 0] = self.code.nu(point.q, point.t, self._p)
         except (ArithmeticError, ValueError):

@@ -35,7 +35,7 @@ class Rates:
     # q_dot, q_ddot, in the shape of q: the rates; not finite where they cannot be had
     q_dot: Array
     q_ddot: Array
-    movement: Array  # in the shape of q: the solution for the right side that was asked for besides
+    movement: Array  # in the shape of q: the solution for the extra right side
     # nu, gamma: the right sides, (m,), or of a batch a row each
     nu: Any
     gamma: Any
@@ -63,8 +63,8 @@ class Linear(ABC):
         """Return Phi_q x - b, of a batch a row each."""
 
     @abstractmethod
-    def rates(self, point: Point, besides: Array | None) -> Rates:
-        """Return the rates at a point, and x of Phi_q x = besides if that is asked for."""
+    def rates(self, point: Point, extra_rhs: Array | None) -> Rates:
+        """Return the rates at a point; with `extra_rhs` also x of Phi_q x = extra_rhs."""
 
     @abstractmethod
     def determinants(self, point: Point, before: Point) -> Array:
@@ -77,9 +77,9 @@ class Linear(ABC):
     def signs(self, point: Point) -> tuple[float, ...]:
         """Return their signs at one point; none where redundant equations forbid a determinant."""
 
-    def solved(self, scales: Scales, point: Point, besides: Array | None = None) -> Rates:
+    def solved(self, scales: Scales, point: Point, extra_rhs: Array | None = None) -> Rates:
         """Return the rates at a point as `rates` does, with where they meet their equations."""
-        rates = self.rates(point, besides)
+        rates = self.rates(point, extra_rhs)
         rates.are_met = self.meet(scales, point, rates)
         return rates
 

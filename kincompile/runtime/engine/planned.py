@@ -73,11 +73,11 @@ class Planned(Linear):
         return nu, q_dot, gamma, self.solve(point, gamma)
 
     def rates(
-        self, point: Point, besides: Array | None, into: tuple[Array, Array] | None = None
+        self, point: Point, extra_rhs: Array | None, into: tuple[Array, Array] | None = None
     ) -> Rates:
         """Return the rates at a point, in arrays (n, N) that are given or new ones; see there."""
         nu, q_dot, gamma, q_ddot = self.velocity_and_acceleration(point)
-        movement = () if besides is None else self.solve(point, besides)
+        movement = () if extra_rhs is None else self.solve(point, extra_rhs)
         points = point.q.shape[1]
         velocity, acceleration = into or np.empty((2, len(q_dot), points))
         fill(velocity, q_dot)

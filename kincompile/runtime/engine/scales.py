@@ -127,7 +127,7 @@ class Scales:
         small = self.is_small(point.q - before.q, point.q, tolerance)
         if small and self.holds(point, RESIDUAL_FACTOR * tolerance):
             return True
-        return (small or crawls(corrections)) and bool(self.holds_to_rounding(point))
+        return (small or converges_linearly(corrections)) and bool(self.holds_to_rounding(point))
 
     def weights(self) -> Array:
         """Give by what equations of different units are multiplied to count alike."""
@@ -211,6 +211,6 @@ def norm(vector: Array) -> float:
     return length if length < math.inf else math.hypot(*vector)  # where the squares overflow
 
 
-def crawls(corrections: Sequence[float]) -> bool:
+def converges_linearly(corrections: Sequence[float]) -> bool:
     """Say whether corrections shrink no faster than towards a double root, by halves."""
     return len(corrections) > 1 and corrections[-1] > corrections[-2] / 4

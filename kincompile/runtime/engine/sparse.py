@@ -40,13 +40,13 @@ class Sparse(Linear):
     def solve(self, point: Point, b: Array, *, checked: bool = False) -> Array:
         """Return x of Phi_q x = b, in half the time if it is not checked in the equations.
 
-        A correction of Newton's method need not be: its convergence tells.
+        Corrections of Newton's method need no check: convergence would reveal a bad one.
         """
         self.factor(point)
         return self._solver.solve(point.factors, b, self.reference if checked else None)
 
-    def rates(self, point: Point, besides: Array | None) -> Rates:
-        """Return the rates at a point, and x of Phi_q x = besides if that is asked for."""
+    def rates(self, point: Point, extra_rhs: Array | None) -> Rates:
+        """Return the rates at a point; with `extra_rhs` also x of Phi_q x = extra_rhs."""
         q, t, p = point.q, point.t, self._p
         nu = self.code.nu(q, t, p)
         q_dot = self.solve(point, nu, checked=True)
@@ -55,7 +55,7 @@ class Sparse(Linear):
             return Rates(q_dot, nothing, nothing, nu, nothing)
         gamma = self.code.gamma(q, q_dot, t, p)
         q_ddot = self.solve(point, gamma, checked=True)
-        movement = np.empty(0) if besides is None else self.solve(point, besides)
+        movement = np.empty(0) if extra_rhs is None else self.solve(point, extra_rhs)
         return Rates(q_dot, q_ddot, movement, nu, gamma)
 
     def missing(self, point: Point, x: Array, b: Array) -> Array:

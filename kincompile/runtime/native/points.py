@@ -26,7 +26,7 @@ COPIED: Mapping[int, Function] = {
     2: lambda a, b: (a.copy(), b.copy()),
     4: lambda a, b, c, d: (a.copy(), b.copy(), c.copy(), d.copy()),
 }
-"""Copies of so many arrays. A loop takes longer."""
+"""Copies of one, two or four arrays. A loop takes longer."""
 
 
 class Places:

@@ -193,7 +193,7 @@ class MotionTable:
         for stem, order in known:
             if stem in self.coordinates or stem in self.observed.names:
                 return self._column(stem, order)
-        for stem, order in known:  # what nobody asked for is compiled now, so it comes last
+        for stem, order in known:  # on request these are compiled, so they come last
             if wanted != name and stem in self.joints.names:
                 return self.joints.column(stem, order)
         near = suggestion(wanted, (column.name for column in self.columns())) or "."

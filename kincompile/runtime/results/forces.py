@@ -2,7 +2,7 @@ r"""Forces along a motion: reactions of joints, torques of drivers, what shakes 
 
 They follow from :math:`\Phi_q^T \lambda = Q - M \ddot q`, by code that is derived and compiled on
 request. Where redundant joints share a load, or a position is singular, the system is solved by
-singular values: what changes with multipliers that change nothing else is not determined, and NaN.
+singular values: a force that varies along the null space of the system is not determined, and NaN.
 """
 
 from __future__ import annotations

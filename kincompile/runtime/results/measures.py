@@ -46,7 +46,7 @@ GAUSS_PLACES = 8
 
 @dataclass(frozen=True, slots=True)
 class OutputMeasures:
-    """What an output does in the time that was solved.
+    """Extremes, mean and dwells of an output over the times that were solved.
 
     Attributes
     ----------

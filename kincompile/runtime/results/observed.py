@@ -104,7 +104,7 @@ class Points:
             yield own, self.at(own)
 
     def observe(self, code: Compiled, p: Array, orders: int = 1) -> Array:
-        """Return outputs of some code, and so many of their rates less one, (orders, r, L)."""
+        """Return outputs of some code and their rates below an order, (orders, r, L)."""
         found = empty((orders, len(code.outputs), self.t.size))
         assert code.observe_into is not None
         with np.errstate(all="ignore"):

@@ -208,7 +208,7 @@ def sensitivities(
     ------
     InputError
         If this is no Solution, or one that was pickled or solved with a module from a file, a
-        name is none of a parameter or column, or is there twice, or redundant equations would no
+        name belongs to no parameter or column, or is there twice, or redundant equations would no
         longer agree if a parameter changed.
     UnsupportedError
         If the mechanism is so large that its module is in grouped form.

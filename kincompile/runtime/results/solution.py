@@ -93,7 +93,7 @@ class Solution(MotionTable):
 
     @property
     def joints(self) -> Observed:
-        """What nobody asked for, on request: the points of the joints, ``x_<joint>`` and so on.
+        """Columns on request: the points of the joints, ``x_<joint>`` and so on.
 
         In space the angular velocities of bodies too, ``omega_x_<body>`` to ``omega_zeta_<body>``.
         """
@@ -205,8 +205,8 @@ class Solution(MotionTable):
         """Draw columns over time, or over another column: ``plot("ram.y", x="crank.phi")``.
 
         Over time events and gaps are marked. Over another column dots stand at equal times, and
-        ``plot("foot.y", x="foot.x")`` is the path of a point, with equal scales. Variants are told
-        apart by colour, with a legend, or a colour bar where they are many.
+        ``plot("foot.y", x="foot.x")`` is the path of a point, with equal scales. Each variant has
+        a colour, with a legend, or a colour bar where they are many.
 
         Parameters
         ----------

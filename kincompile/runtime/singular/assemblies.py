@@ -111,7 +111,7 @@ def assembled_positions(inputs: Inputs) -> Vector:
 
 
 def is_new(equations: Problem, q: Vector, others: Iterable[Vector]) -> bool:
-    """Say whether a position is none of others, whatever whole turns lie between."""
+    """Say whether a position differs from all others, apart from whole turns."""
     return all(equations.distance(q, other) > SAME_POSITION for other in others)
 
 
@@ -150,7 +150,7 @@ def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
     missing = [body for body in differing if body in without]
     cause = f"there is no guess of {listed(missing)}" if missing else "the guess lies folded"
     return (
-        f"{inputs.code.name}: {cause}, so that nothing chooses between {len(found)} assemblies at "
+        f"{inputs.code.name}: {cause}, and there are {len(found)} assemblies at "
         f"t = {inputs.t[0]:.10g}, which differ in {listed(differing)}; this is number {taken + 1}. "
         f"Take another with assembly={2 if taken == 0 else 1} (--assembly on the command line; "
         "kincompile assemblies draws them), or give a guess nearer to it."

@@ -1,9 +1,9 @@
 r"""Singular configurations of a motion: located in time, classified, and named.
 
 Where :math:`\Phi_q` is singular, its null vector :math:`v` is a movement that no equation forbids.
-At a lock-up the drivers demand what the joints cannot give: velocities grow beyond all bounds, and
-time cannot go on. At a bifurcation two motions cross, velocities stay finite, and the mechanism
-may go on along either.
+At a lock-up the drivers prescribe a motion that the joints do not allow: velocities become
+unbounded, and the motion ends. At a bifurcation two motions cross, velocities stay finite, and the
+mechanism may continue along either.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ LOCK_UP, BIFURCATION, BRANCH_SWITCH = "lock-up", "bifurcation", "branch switch"
 
 SENTENCES = {
     LOCK_UP: (
-        "Lock-up at t = {t}: Phi_q is singular, and the velocities of {bodies} grow "
-        "beyond all bounds: the drivers demand what the joints cannot give. End the motion "
-        "before this time (shorten the range of the drivers), change lengths, or drive one of "
-        "these bodies instead."
+        "Lock-up at t = {t}: Phi_q is singular, and the velocities of {bodies} "
+        "become unbounded: the drivers prescribe a motion that the joints do not allow. End the "
+        "motion before this time (shorten the range of the drivers), change lengths, or drive one "
+        "of these bodies instead."
     ),
     BIFURCATION: (
         "Bifurcation at t = {t}: Phi_q is singular, but velocities stay finite: {bodies} may "
-        "go on in two ways. kc.solve(..., through='smooth'), or --through smooth, goes on along "
-        "the smooth branch; otherwise end the motion before this time, change a length slightly, "
+        "continue in two ways. kc.solve(..., through='smooth'), or --through smooth, follows the "
+        "smooth branch; otherwise end the motion before this time, change a length slightly, "
         "or drive one of these bodies near this time."
     ),
     BRANCH_SWITCH: (
@@ -55,14 +55,14 @@ SENTENCES = {
         "motion at that time if the jump is wanted."
     ),
 }
-"""What is said of an event."""
+"""The message of an event, by its kind."""
 
 DOUBTS = {
     "strays": "The position at t = {t} is on another branch than the guess: ",
     "other": "Another position at t = {t}, with {bodies} elsewhere, is as near to the guess: ",
     "remedy": "kc.assemblies gives all of them, and each serves as a guess.",
 }
-"""What is said of a start that may not be the one that is meant."""
+"""Warnings about a start on another branch than the guess may mean."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -121,7 +121,7 @@ class Balance:
         both = np.linalg.solve(inertia, np.hstack((-stiffness, slopes)))
         size = len(both)
         s = np.linalg.eigvals(np.vstack((np.eye(size, 2 * size, size), both)))
-        # What a stiffness that is nothing lets grow says nothing.
+        # Growth along a direction without stiffness does not make an equilibrium unstable.
         is_drift = np.abs(s) ** 2 * values.min(initial=np.inf) <= place.nothing
         if np.abs(np.linalg.eigvals(stiffness)).min(initial=np.inf) > place.nothing:
             is_drift[:] = False

@@ -421,6 +421,6 @@ def _message(inputs: Inputs, balance: Balance, found: list[Rest], events: list[E
     bodies = listed(involved(inputs.code, place.free @ place.force / balance.scale))
     return (
         f"{name} has no equilibrium at t = {times[count - 1]:.10g} that is reached from the "
-        f"guess: loads push {bodies} on, and nothing holds them there. Add a spring, a stop or a "
+        f"guess: the loads on {bodies} are not balanced there. Add a spring, a stop or a "
         "joint, or give a guess nearer to the equilibrium."
     )

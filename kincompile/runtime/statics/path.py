@@ -61,18 +61,18 @@ def follow(
 
     With `through="snap"` they go on from where the mechanism comes to rest.
     """
-    way = _Way(balance, abs(times[-1] - times[0]) or 1.0, through is not None, [])
+    continuation = _Continuation(balance, abs(times[-1] - times[0]) or 1.0, through is not None, [])
     found: list[Rest] = [rest]
     for t in times[1:]:
-        following = way.continued(found[-1], t)
+        following = continuation.continued(found[-1], t)
         if following is None or not following.is_balanced:
             break
         found.append(following)
-    return found, way.events
+    return found, continuation.events
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Way:
+class _Continuation:
     """Going from one equilibrium to the next."""
 
     balance: Balance

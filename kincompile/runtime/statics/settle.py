@@ -96,7 +96,7 @@ def _move(place: Place, stiffness: Array, climbing: int | None) -> tuple[Array, 
         steps = REACH * np.eye(values.size)[np.argmin(held)]
     else:
         sizes = np.maximum(np.abs(values), place.nothing or 1.0)
-        # What nothing holds back goes on for ever, and keeps nothing else from coming to rest.
+        # Unrestrained coordinates drift forever; they must not delay the others.
         steps = signs * np.clip(force / sizes, -REACH, REACH)
     return ways @ steps, ways @ (signs * steps)
 

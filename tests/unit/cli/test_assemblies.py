@@ -87,7 +87,7 @@ def test_that_a_start_without_a_guess_is_the_first_line_of_what_run_says(model):
     model.write_text(MODEL.replace("B=(20, 20)", "B=(40, 0)"))
     done = run("run", model)
     assert done.exit_code == 0
-    assert done.stderr.startswith("Warning: four_bar: the guess lies folded, so that nothing")
+    assert done.stderr.startswith("Warning: four_bar: the guess lies folded, and there are 2")
 
 
 def test_that_a_mechanism_that_cannot_be_assembled_is_told(model, tmp_path):

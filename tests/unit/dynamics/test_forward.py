@@ -336,7 +336,7 @@ class TestBadInput:
     def test_that_a_body_without_mass_is_named(self):
         m = double_pendulum()
         m.body("ghost", (1, 1, 0))
-        with pytest.raises(kc.StructuralError, match=r"ghost has no mass.*give mass="):
+        with pytest.raises(kc.StructuralError, match=r"ghost has no mass.*Give m.body mass="):
             kc.simulate(kc.compile(m), [0, 1])
 
     def test_that_a_mechanism_without_loads_is_refused(self):

@@ -194,7 +194,7 @@ def changed(old, new):
 @pytest.mark.parametrize(
     ("text", "line", "said"),
     [
-        (changed('joints = "O A"', 'joints = "O X"'), 10, "link 'crank': nobody drew the joints X"),
+        (changed('joints = "O A"', 'joints = "O X"'), 10, "link 'crank': unknown joints X"),
         (changed('"E F G", EF', '"E F G", EX'), 16, "link 'leg', EX: EX is not a pair"),
         (changed("link = ", "rope = "), 10, "one of link, wheel, slider, slot, gear, drive"),
         (changed('length = "m"', 'length = "mm"'), 10, "column 1 of 'mm'"),
@@ -242,8 +242,8 @@ def test_that_a_drawing_without_end_is_refused_at_once():
 @pytest.mark.parametrize(
     ("old", "new", "line", "said"),
     [
-        ('"P Q B"', '"P Q X"', 15, "link 'rocker': nobody drew the joints X"),
-        ("O = [0, 0, 1]", "Z = [0, 0, 1]", 12, "hinge 'Z': nobody drew the joints Z"),
+        ('"P Q B"', '"P Q X"', 15, "link 'rocker': unknown joints X"),
+        ("O = [0, 0, 1]", "Z = [0, 0, 1]", 12, "hinge 'Z': unknown joints Z"),
         ("O = [0, 0, 1]", "O = [0, 1]", 12, "[x, y, z]"),
         ('joints = "A B"', 'joints = "A B", width = 2', 16, "width"),
         ('{ rod = "coupler"', '{ gear = "coupler"', 16, "one of link, slider, rod, drive"),

@@ -61,7 +61,7 @@ def bad_loads():
     yield kc.Force("f", body, (0, 0), 3), "force: 3 is not a force of 2 components"
     yield kc.Force("f", body, (0, 0), (sympy.Symbol("u"), 0)), "contains u, which is not declared"
     yield kc.Torque("f", body, sympy.Abs(body.phi)), "has no continuous derivative"
-    yield kc.Torque("f", body, sympy.Symbol("phi_arm_ddot")), "depends on accelerations"
+    yield kc.Torque("f", body, sympy.Symbol("phi_arm_ddot")), "cannot depend on accelerations"
     yield kc.Spring("f", body, (0, 0), body, (1, 0), 3), "a load between two bodies needs two"
     yield kc.Spring("f", g, (0, 0), body, (0, 0), 3, -1), "the free length is -1"
     yield kc.Spring("f", g, (0, 0), body, (0, 0)), "it has no stiffness, no damping and no force"

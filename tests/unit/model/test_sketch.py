@@ -191,7 +191,7 @@ def test_that_a_joint_of_three_links_is_two_pins():
             " P B together (5.5 cm)",
         ),
         (lambda s: s.link("arm", "A"), "link 'arm' has 1 joints, and needs 2 or more; a body with"),
-        (lambda s: s.link("arm", "A X"), "link 'arm': nobody drew the joints X; joints are: O, C,"),
+        (lambda s: s.link("arm", "A X"), "link 'arm': unknown joints X; joints are: O, C,"),
         (lambda s: s.link("arm", "A A"), "link 'arm': A, A names a joint twice"),
         (lambda s: s.link("arm", "A B", 0), "link 'arm', A B: the length is 0; give one that is"),
         (lambda s: s.link("arm", "A B", -2.5), "link 'arm', A B: the length is -2.5; give one"),
@@ -205,7 +205,7 @@ def test_that_a_joint_of_three_links_is_two_pins():
         (lambda s: s.link("arm", "A B P", P=3), "arm', P: 3 is not a place (xi, eta) in the frame"),
         (
             lambda s: s.link("arm", "A B P", AP=2, BP=2, P=(1, 1)),
-            "arm': the lengths A P, B P are more than fix its shape",
+            "arm': the link is over-dimensioned; remove the lengths A P, B P",
         ),
         (
             lambda s: (s.joints(Q=(2.05, 1.55)), s.link("arm", "A B Q", AQ=2, BQ=3)),
@@ -224,7 +224,7 @@ def test_that_a_joint_of_three_links_is_two_pins():
         (lambda s: s.link("ground", "A B"), "there is a link 'ground' already; draw its joints"),
         (lambda s: s.slider("ram", "P", along="A B"), "slider 'ram': no link has both A and B"),
         (lambda s: s.slider("ram", "P", along=3), "slider 'ram': 3 is not two joints of one link"),
-        (lambda s: s.slider("ram", "P", along=(0, 0)), "slider 'ram': the direction (0, 0) is"),
+        (lambda s: s.slider("ram", "P", along=(0, 0)), "the direction (0, 0) has zero length"),
         (lambda s: s.slider("ram", "P", (1, 0), "arm"), "slider 'ram': there is no link 'arm'"),
         (lambda s: s.slot("P", along=(1, 0)), "slot of 'P': no link has the joint 'P' yet"),
         (lambda s: s.slot("A B", along=(1, 0)), "slot of 'A B' has 2 joints, and needs 1"),

@@ -120,7 +120,9 @@ def test_that_a_guess_given_to_solve_chooses_by_the_names_of_a_solution():
 
 
 def test_that_a_folded_guess_of_ones_own_is_remarked_on():
-    with pytest.warns(kc.AssemblyWarning, match="the guess lies folded, so that nothing chooses"):
+    with pytest.warns(
+        kc.AssemblyWarning, match="the guess lies folded, and there are 2 assemblies"
+    ):
         kc.solve(four_bar(), 0.0, guess={"coupler.phi": 0.1, "rocker.phi": 0.1})
 
 

@@ -138,7 +138,7 @@ def test_that_what_is_asked_for_again_is_not_compiled_again(example_named):
     assert code.request(SENSITIVE, ("a",)) is code.request(SENSITIVE, ("a",))
     of_file = code_of(from_source(kc.emit(example.model).source, "four_bar"))
     assert of_file.points() is of_file
-    with pytest.raises(kc.InputError, match=r"loaded from a file.*compile the model, solve with"):
+    with pytest.raises(kc.InputError, match=r"loaded from a file.*Compile the model, solve with"):
         of_file.request(SENSITIVE, ("a",))
 
 

@@ -452,7 +452,7 @@ def test_what_is_said_of_wrong_names():
 def test_what_is_said_of_a_module_from_elsewhere(tmp_path):
     model = slider_crank()
     (path, *_) = kc.emit(model).write(tmp_path)
-    with pytest.raises(InputError, match="compile the model, solve with that"):
+    with pytest.raises(InputError, match="Compile the model, solve with that"):
         kc.sensitivities(kc.solve(kc.load(path), TIMES), ["r"])
     copied = pickle.loads(pickle.dumps(kc.solve(kc.compile(model), TIMES)))
     with pytest.raises(InputError, match="was pickled"):

@@ -83,22 +83,25 @@ def lonely(s: spatial.Sketch) -> None:
 
 WRONG: dict[str, tuple[Callable[[spatial.Sketch], object], str]] = {
     "pair": (lambda s: s.joints(C=(1, 2)), "joint 'C': (1, 2) is not a place (x, y, z)"),
-    "unknown": (lambda s: s.link("arm", "A X"), "link 'arm': nobody drew the joints X"),
-    "axis": (lambda s: s.hinges(A=(0, 0, 0)), "hinge 'A': the direction (0, 0, 0) is none"),
-    "no hinge": (lambda s: s.hinges(X=(0, 0, 1)), "hinge 'X': nobody drew the joints X"),
-    "fast": (fork, "link 'twin' shares C, D, E with 'arm', which three joints hold fast"),
+    "unknown": (lambda s: s.link("arm", "A X"), "link 'arm': unknown joints X"),
+    "axis": (lambda s: s.hinges(A=(0, 0, 0)), "hinge 'A': the direction (0, 0, 0) has zero length"),
+    "no hinge": (lambda s: s.hinges(X=(0, 0, 1)), "hinge 'X': unknown joints X"),
+    "fast": (
+        fork,
+        "link 'twin' shares C, D, E with 'arm', and three shared joints lock the two links",
+    ),
     "twice": (lambda s: (s.link("arm", "A B"), s.link("arm", "A B")), "a link 'arm' already"),
     "drive": (lambda s: s.drive("ground", 1), "drive of 'ground': it neither slides nor hangs"),
     "far": (lambda s: s.drive("arm", 1), "drive of 'arm': drive a link, a slider"),
     "rod": (lonely, "no link has the joint 'C' yet"),
     "line": (
         lambda s: s.slider("box", "A", along="A B C"),
-        "slider 'box': nobody drew the joints C",
+        "slider 'box': unknown joints C",
     ),
     "none": (
         lambda s: s.slider("box", "A", along=(0, 0, 0)),
-        "slider 'box': the direction (0, 0, 0) is none; two joints of one link, along='C D', or a "
-        "direction, along=(1, 0, 0)",
+        "slider 'box': the direction (0, 0, 0) has zero length; two joints of one link, "
+        "along='C D', or a direction, along=(1, 0, 0)",
     ),
 }
 

@@ -136,7 +136,7 @@ def test_a_place_that_no_sweep_wrote_is_refused(ending, tmp_path):
     file.write_text("mine")
     folder.mkdir()
     for place in (file, folder):
-        with pytest.raises(kc.InputError, match="is there, and no sweep wrote it"):
+        with pytest.raises(kc.InputError, match="exists and was not written by a sweep"):
             sweep(store=place)
     assert file.read_text() == "mine"
     with pytest.raises(kc.InputError, match=r"cannot write to .*No such file"):
@@ -155,7 +155,7 @@ def test_a_place_that_no_sweep_wrote_is_refused(ending, tmp_path):
         ({"columns": ["x_tp"]}, "no column 'x_tp'; did you mean 'x_tip'"),
         ({"columns": [], "measures": []}, "nothing is kept"),
         ({"measures": ["tip.x.strok"]}, "no measure 'tip.x.strok'; did you mean 'stroke'"),
-        ({"measures": ["x_arm.stroke"]}, "x_arm is no output"),
+        ({"measures": ["x_arm.stroke"]}, "x_arm is a coordinate; measures are defined for outputs"),
         ({"columns": ["a.b"], "measures": ["x.y"]}, "2 problems"),
         ({"chunk": 0}, "chunk is 0"),
         (

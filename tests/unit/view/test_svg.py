@@ -253,9 +253,9 @@ def test_that_a_picture_in_motion_begins_as_the_still_one(name, tmp_path):
     [
         (("a.png",), r"cannot write a\.png: end its name in \.svg or \.dxf"),
         (("no/such/a.svg",), "the folder .*such does not exist"),
-        (("a.svg", 0.51), r"t = 0\.51 is none of its 41 times; the nearest is 0\.5:"),
-        (("a.svg", 3.0), "solved from t = 0 to 2, and t = 3 is none"),
-        (("a.svg", float("nan")), "t = nan is none"),
+        (("a.svg", 0.51), r"t = 0\.51 is not among its 41 times; the nearest is 0\.5:"),
+        (("a.svg", 3.0), "solved from t = 0 to 2, and t = 3 is not among"),
+        (("a.svg", float("nan")), "t = nan is not among"),
     ],
 )
 def test_that_what_cannot_be_drawn_is_told(motion, tmp_path, monkeypatch, arguments, message):
