@@ -33,7 +33,7 @@ help:
 	@echo "make demo            compile the wrecker boom, run it, show it on a page"
 	@echo "make test            run the tests (4 minutes)     make test-all     and the exhaustive rest"
 	@echo "make test-elsewhere  make test as on an older processor: numbers in emitted text are the same"
-	@echo "make lint            ruff check, ruff format       make format       repair what ruff can"
+	@echo "make lint            ruff; tsc, eslint of pages    make format       repair what ruff can"
 	@echo "make types           mypy                          make bench        the benchmarks"
 	@echo "make budget          count the lines and what new things touch; fail above .ci/budget.toml"
 	@echo "make goldens         compare generated/ with re-emission, under several hash seeds"
@@ -62,9 +62,10 @@ $(PAGES_READY): $(TEST_READY)
 	@$(PIP) --editable '.[pages]'
 	@touch $@
 
-$(LINT_READY): $(TEST_READY)
-	@echo "Installing ruff and mypy into $(VENV)"
+$(LINT_READY): $(TEST_READY) .ci/page/package-lock.json
+	@echo "Installing ruff and mypy into $(VENV), tsc and eslint into .ci/page"
 	@$(PIP) --editable '.[lint]'
+	@PATH="$(CURDIR)/$(BIN):$$PATH" npm ci --prefix .ci/page --silent
 	@touch $@
 
 demo: $(DEMO_READY)
@@ -97,10 +98,16 @@ test-elsewhere: export GLIBC_TUNABLES := glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usabl
 test-elsewhere: $(TEST_READY)
 	@NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c '$(FEATURES)')" $(PYTEST) --numprocesses=auto --dist=loadfile
 
+# The scripts of a page share one scope, so that each kind of page is read by itself.
+PAGES := plane space gallery watch
+NODE_TOOL := PATH="$(CURDIR)/$(BIN):$$PATH" .ci/page/node_modules/.bin
+
 lint: $(LINT_READY)
 	@$(BIN)/ruff check --quiet
 	@$(BIN)/ruff format --quiet --check
 	@$(BIN)/ruff check --quiet --isolated --select E9,F generated
+	@for page in $(PAGES); do $(NODE_TOOL)/tsc --project .ci/page/tsconfig.$$page.json || exit 1; done
+	@$(NODE_TOOL)/eslint --config .ci/page/eslint.config.js templates/view templates/javascript
 
 format: $(LINT_READY)
 	@$(BIN)/ruff check --fix

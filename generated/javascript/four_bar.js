@@ -2037,7 +2037,7 @@ const four_bar = (() => {
         }
 
         function endOf(motion) {
-            const { equations, failed, t } = motion, { state, position, nearest, jumps, status } = failed;
+            const { equations, failed } = motion, { state, position, nearest, jumps, status } = failed;
             if (!state) return status === SINGULAR && position ? singularStart(equations, position) : null;
             const found = located(equations, state, failed.t) || locatedFromPoint(motion);
             if (found || !jumps) return found;

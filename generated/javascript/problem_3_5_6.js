@@ -1891,7 +1891,7 @@ const problem_3_5_6 = (() => {
         }
 
         function endOf(motion) {
-            const { equations, failed, t } = motion, { state, position, nearest, jumps, status } = failed;
+            const { equations, failed } = motion, { state, position, nearest, jumps, status } = failed;
             if (!state) return status === SINGULAR && position ? singularStart(equations, position) : null;
             const found = located(equations, state, failed.t) || locatedFromPoint(motion);
             if (found || !jumps) return found;

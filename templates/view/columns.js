@@ -113,8 +113,11 @@ function residualItems({ arrays, drawing: { joints } }) {
 }
 
 function jacobianItems({ arrays }) {
-  const all = [['condition', 'condition number of Phi_q', true], ['determinant', 'determinant of Phi_q', false]];
-  return all.filter(([name]) => arrays[name]).map(([name, label, isLog]) => ({
+  const all = [
+    { name: 'condition', label: 'condition number of Phi_q', isLog: true },
+    { name: 'determinant', label: 'determinant of Phi_q', isLog: false },
+  ];
+  return all.filter(({ name }) => arrays[name]).map(({ name, label, isLog }) => ({
     label, unit: '', isLog, values: () => entries(name, 0, 1),
   }));
 }

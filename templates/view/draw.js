@@ -75,6 +75,7 @@ class Pen {
     this.ctx.fill();
   }
 
+  /** @param {number[]} place */
   circle([x, y], radius) {
     this.ctx.beginPath();
     this.ctx.arc(x, y, Math.max(radius, 0.1), 0, 2 * Math.PI);
@@ -103,7 +104,8 @@ function distanceBetween(from, to) {
 }
 
 /* The direction from one point to another, of length one, and the distance. */
-function towards([x0, y0], [x1, y1]) {
+function towards(from, to) {
+  const [x0, y0] = from, [x1, y1] = to;
   const length = Math.hypot(x1 - x0, y1 - y0);
   return length ? [(x1 - x0) / length, (y1 - y0) / length, length] : [1, 0, 0];
 }
@@ -192,6 +194,7 @@ const COLOURS = ['paper', 'ink', 'quiet', 'line', 'tint', 'bad', 'velocity', 'ac
 function paletteNow(drawing = player.data.drawing) {
   const probe = document.createElement('span');
   document.body.append(probe);
+  /** @type {Object<string, any>} */
   const palette = Object.fromEntries(COLOURS.map(name => {
     probe.style.color = `var(--${name})`;
     return [name, getComputedStyle(probe).color];

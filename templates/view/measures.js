@@ -16,8 +16,14 @@ class OutputMotion {
     const rows = [...motion.t.keys()].filter(row => Number.isFinite(motion.q_ddot[row * player.n]));
     if (motion.t[0] > motion.t[motion.t.length - 1]) rows.reverse();
     const column = values => rows.map(row => values[row * width + k]);
-    Object.assign(this, { motion, k, name, unit, t: rows.map(row => motion.t[row]) });
-    [this.y, this.y_dot, this.y_ddot] = [motion.y, motion.y_dot, motion.y_ddot].map(column);
+    this.motion = motion;
+    this.k = k;
+    this.name = name;
+    this.unit = unit;
+    this.t = rows.map(row => motion.t[row]);
+    this.y = column(motion.y);
+    this.y_dot = column(motion.y_dot);
+    this.y_ddot = column(motion.y_ddot);
     this.span = this.t[this.t.length - 1] - this.t[0];
     this.most = largestOf(this.y_dot);
     this.known = new Map(this.t.map((t, row) => [t, [this.y[row], this.y_dot[row], this.y_ddot[row]]]));
@@ -74,9 +80,9 @@ class OutputMotion {
     const smallest = LOCATED * this.span, atLow = this.at(low)[1];
     let [before, rateBefore, t] = [low, atLow, (low + high) / 2];
     for (let k = 0; k < ROOT_STEPS; k++) {
-      let [, rate, slope] = this.at(t);
+      const [, rate, given] = this.at(t);
       if (!Number.isFinite(rate) || rate === 0) break;
-      if (!Number.isFinite(slope)) slope = (rate - rateBefore) / (t - before);
+      const slope = Number.isFinite(given) ? given : (rate - rateBefore) / (t - before);
       if (rate * atLow > 0) low = t; else high = t;
       [before, rateBefore] = [t, rate];
       const following = slope ? t - rate / slope : low;
@@ -170,6 +176,7 @@ function outputNumber({ least, greatest, unit }, value) {
   return shortNumber(Math.abs(value) < STILL * size ? 0 : value * units.factor(unit));
 }
 
+/** @type {[string, (item: any) => string][]} */
 const MEASURES = [
   ['min', item => outputNumber(item, item.least)],
   ['at t', item => shortNumber(item.tLeast)],

@@ -40,10 +40,10 @@ const newtonTables = (() => {
     for (let value = 4 * Math.floor(highest / 4); value >= LOWEST; value -= 4) {
       const line = { class: 'rule', x1: left, x2: width - right, y1: y(value), y2: y(value) };
       const label = { x: left - 5, y: y(value) + 4, 'text-anchor': 'end' };
-      svg.append(svgElement('line', line), svgElement('text', label, value));
+      svg.append(svgElement('line', line), svgElement('text', label, String(value)));
     }
     for (let k = 0; k <= last; k += Math.ceil(last / 10)) {
-      svg.append(svgElement('text', { x: x(k), y: height - 8, 'text-anchor': 'middle' }, k));
+      svg.append(svgElement('text', { x: x(k), y: height - 8, 'text-anchor': 'middle' }, String(k)));
     }
     curve(svg, 'residual', residuals.map((value, k) => [x(k), y(value)]));
     curve(svg, 'correction', corrections.map((value, k) => [x(k + 1), y(value)]));

@@ -21,10 +21,12 @@ class View {
     this.top = height / 2 + this.scale * y;
   }
 
+  /** @param {number[]} place */
   toScreen([x, y]) {
     return [this.left + this.scale * x, this.top - this.scale * y];
   }
 
+  /** @param {number[]} place */
   toWorld([x, y]) {
     return [(x - this.left) / this.scale, (this.top - y) / this.scale];
   }
@@ -45,7 +47,8 @@ function proportions([left, right, low, high]) {
   return (right - left) / (high - low);
 }
 
-/* Where a point of a frame is. */
+/** Where a point of a frame is.
+ * @param {any} q @param {any} frame @param {number[]} point */
 function inWorld(q, frame, [xi, eta]) {
   if (isGround(frame)) return [xi, eta];
   const [x, y, phi] = frame.columns;
@@ -68,7 +71,8 @@ function ratesInWorld(state, frame, [xi, eta]) {
 }
 
 /* Components of a point of the world in a frame. */
-function inFrame(q, frame, [x, y]) {
+function inFrame(q, frame, place) {
+  const [x, y] = place;
   if (isGround(frame)) return [x, y];
   const [column_x, column_y, phi] = frame.columns, [dx, dy] = [x - q[column_x], y - q[column_y]];
   const c = Math.cos(q[phi]), s = Math.sin(q[phi]);
@@ -201,12 +205,12 @@ function areasOf(pen, frame) {
 }
 
 /* The frame that is held at a place, and its point there. */
-function heldAt(q, frame, place) {
+function heldAt(q, frame, place, view) {
   return { frame, point: inFrame(q, frame, place) };
 }
 
 /* Frames from back to front. */
-function stacked(frames) {
+function stacked(frames, q, view) {
   return frames;
 }
 
@@ -286,13 +290,13 @@ function bodyTip({ name, frame }, state) {
 }
 
 /* The knob that turns a body, from its origin on the screen: along its xi axis. */
-function knobOf(q, frame) {
+function knobOf(q, frame, view) {
   const phi = angleOf(q, frame);
   return [Math.cos(phi), -Math.sin(phi)];
 }
 
 /* Move a body and turn it, counterclockwise, on the screen. */
-function moveBody(q, { columns: [x, y, phi] }, [right, up], turn) {
+function moveBody(q, { columns: [x, y, phi] }, [right, up], turn, view) {
   q[x] += right;
   q[y] += up;
   q[phi] += turn;

@@ -392,7 +392,7 @@ const plots = {
   overs() {
     const { outputs, coordinates, drawing } = player.data;
     const driven = new Set(drawing.marks.filter(mark => mark.kind === 'drive').map(mark => mark.place.frame.index));
-    const angles = drawing.frames.toSorted((a, b) => driven.has(b.index) - driven.has(a.index))
+    const angles = drawing.frames.toSorted((a, b) => Number(driven.has(b.index)) - Number(driven.has(a.index)))
       .flatMap(frame => liveliestOf([frame])[0].map(k => coordinates[k].name));
     return [...angles, ...outputs.map(({ name }) => name)];
   },

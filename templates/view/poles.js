@@ -4,7 +4,8 @@
    For r_P = r + A s the velocity is r_dot + omega k x (r_P - r), with k x (x, y) = (-y, x). */
 
 /* Angular velocity of a body, and the velocity that its point at the world's origin would have. */
-function spinOf(state, { columns: [x, y, phi] }) {
+function spinOf(state, { columns }) {
+  const [x, y, phi] = columns;
   if (phi === undefined) return { omega: 0, velocity: [0, 0] };
   const { q, q_dot } = state, omega = q_dot[phi];
   return { omega, velocity: [q_dot[x] + omega * q[y], q_dot[y] - omega * q[x]] };

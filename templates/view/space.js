@@ -43,7 +43,8 @@ function originOf(q, { columns: [x, y, z] }) {
   return [q[x], q[y], q[z]];
 }
 
-/* Where a point of a frame is. */
+/** Where a point of a frame is.
+ * @param {any} q @param {any} frame @param {number[]} point */
 function inWorld(q, frame, [xi, eta, zeta = 0]) {
   if (isGround(frame)) return [xi, eta, zeta];
   return plus(originOf(q, frame), turned(parametersOf(q, frame), [xi, eta, zeta]));
@@ -156,8 +157,8 @@ const orbit = {
     stage.canvas.addEventListener('contextmenu', event => event.preventDefault());
     for (const id of ['poles', 'centrodes']) document.getElementById(id).closest('label').hidden = true;
     const pointing = document.getElementById('pointing'), moves = 'moves the drawing';
-    const said = [...pointing.childNodes].find(node => node.data?.includes(moves));
-    said.data = said.data.replace(moves, 'turns the drawing, with Shift or the right button it moves');
+    const said = [...pointing.childNodes].find(node => node.nodeValue?.includes(moves));
+    said.nodeValue = said.nodeValue.replace(moves, 'turns the drawing, with Shift or the right button it moves');
     pointing.append(' 1 front, 2 side, 3 top, 4 isometric, P perspective.');
   },
 };
@@ -170,12 +171,17 @@ class View {
     this.fit = Math.min((width / 2 - margin) / wide, (height / 2 - margin) / tall);
     this.scale = this.fit * (camera ? camera.zoom : 1);
     this.centre = camera ? camera.centre : middle;
-    [this.right, this.up, this.back] = axesSeenFrom([orbit.azimuth, orbit.height]);
+    const [right, up, back] = axesSeenFrom([orbit.azimuth, orbit.height]);
+    this.right = right;
+    this.up = up;
+    this.back = back;
     this.eye = orbit.isPerspective ? EYE * distanceBetween(middle, extent.filter((_, k) => k % 2)) : Infinity;
-    [this.left, this.top] = [width / 2, height / 2];
+    this.left = width / 2;
+    this.top = height / 2;
   }
 
-  /* The place on the screen, and how near it is. */
+  /** The place on the screen, and how near it is.
+   * @param {number[]} place */
   toScreen([x, y, z = 0]) {
     const way = minus([x, y, z], this.centre), depth = product(way, this.back), by = this.scale * this.nearness(depth);
     return [this.left + by * product(way, this.right), this.top - by * product(way, this.up), depth];
@@ -186,7 +192,8 @@ class View {
     return this.eye === Infinity ? 1 : this.eye / Math.max(this.eye - depth, 0.02 * this.eye);
   }
 
-  /* The place as near as another one. */
+  /** The place as near as another one.
+   * @param {number[]} place */
   toWorld([x, y], depth = 0) {
     const by = this.scale * this.nearness(depth);
     return plus(plus(this.centre, this.way((x - this.left) / by, (this.top - y) / by)), this.back, depth);
@@ -214,6 +221,7 @@ function middleOfExtent(extent) {
 }
 
 /* To the right, up and towards the viewer. */
+/** @param {number[]} direction */
 function axesSeenFrom([azimuth, height]) {
   const [c, s, a, b] = [Math.cos(azimuth), Math.sin(azimuth), Math.cos(height), Math.sin(height)];
   return [[-s, c, 0], [-b * c, -b * s, a], [a * c, a * s, b]];
@@ -235,7 +243,7 @@ function spansOf({ marks, states, size }, axes) {
 }
 
 /* Width by height of what is seen of an extent. */
-function proportions() {
+function proportions(extent) {
   return 1.5;
 }
 
@@ -387,9 +395,10 @@ function beyond(points, { corners: [a], normal }, k) {
 
 /* The triangles of a hull, counterclockwise seen from outside: from four points on, the triangles that a
    point sees give way to those between it and the edge of what it sees. */
-function trianglesAround(points, own, [a, b, c, d], near) {
+function trianglesAround(points, own, corners, near) {
+  const [a, b, c, d] = corners;
   const isBelow = beyond(points, triangleOf(points, [a, b, c]), d) < 0, [p, q, r] = isBelow ? [a, b, c] : [a, c, b];
-  let found = [[p, q, r], [q, p, d], [r, q, d], [p, r, d]].map(corners => triangleOf(points, corners));
+  let found = [[p, q, r], [q, p, d], [r, q, d], [p, r, d]].map(three => triangleOf(points, three));
   for (const k of own) {
     const seen = found.filter(triangle => beyond(points, triangle, k) > near);
     const sides = new Map(seen.flatMap(({ corners: [i, j, l] }) => [[i, j], [j, l], [l, i]].map(side => [`${side}`, side])));

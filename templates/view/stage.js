@@ -57,7 +57,8 @@ class Stage {
     this.canvas.height = Math.round(height * dense);
     this.canvas.style.height = `${height}px`;
     this.ctx.setTransform(dense, 0, 0, dense, 0, 0);
-    [this.width, this.height] = [width, height];
+    this.width = width;
+    this.height = height;
     this.palette = paletteNow();
   }
 
@@ -135,6 +136,7 @@ class Stage {
   }
 
   /* Text on the drawing, with a seam of paper. */
+  /** @param {any} text @param {number[]} place */
   write(text, [x, y], colour, weight = '', align = 'start') {
     const { ctx, palette } = this;
     Object.assign(ctx, { font: this.font(weight), textBaseline: 'bottom', textAlign: align, lineWidth: 4,
@@ -171,6 +173,7 @@ class Stage {
   }
 
   /* The point nearest to a place on the screen, or null. */
+  /** @param {number[]} place */
   near([x, y], reach) {
     let best = null, least = reach;
     for (const point of [...this.points, ...this.places]) {

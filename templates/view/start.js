@@ -1,6 +1,8 @@
 'use strict';
 /* Everything is connected here: controls, keys, tabs, messages, themes. */
 
+/** The element of a name in page.html, of whatever kind.
+ * @param {string} id @returns {any} */
 const byId = id => document.getElementById(id);
 const hasBodies = player.data.drawing.bodies.length > 0;
 
@@ -86,8 +88,8 @@ function connectTransport() {
   });
   byId('play').addEventListener('click', () => player.toggle());
   byId('play').disabled = player.count < 2;
-  byId('speed').append(...SPEEDS.map(speed => new Option(`${speed} ×`, speed)));
-  byId('speed').addEventListener('change', event => player.setSpeed(Number(event.target.value)));
+  byId('speed').append(...SPEEDS.map(speed => new Option(`${speed} ×`, String(speed))));
+  byId('speed').addEventListener('change', () => player.setSpeed(Number(byId('speed').value)));
 }
 
 function showTransport(state) {
@@ -116,14 +118,14 @@ const KEYS = {
   0: () => stage.fit(),
   PageUp: () => stage.zoom(1.25),
   PageDown: () => stage.zoom(0.8),
-  ...(isSpatial && orbit.keys),
+  ...(isSpatial ? orbit.keys : {}),
 };
 const MOVES = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const MOVE = 40;  // pixels that a key moves the drawing
 
 function connectKeys() {
   document.addEventListener('keydown', event => {
-    const { target } = event;
+    const target = /** @type {Element} */ (event.target);
     // Keys belong to a field that is filled in, a list that is open, a button that is pressed.
     const isField = target.matches('select, textarea, input:not(#time, [type=checkbox])');
     const isPressed = event.key === ' ' && target.matches('button, [type=checkbox]');
@@ -171,7 +173,7 @@ function showPanel(name) {
   shownPanel = name;
   for (const other of Object.keys(panels)) {
     byId(`panel-${other}`).hidden = other !== name;
-    byId(`tab-${other}`).setAttribute('aria-selected', other === name);
+    byId(`tab-${other}`).setAttribute('aria-selected', String(other === name));
     byId(`tab-${other}`).tabIndex = other === name ? 0 : -1;
   }
   panels[name]();

@@ -42,12 +42,14 @@ function pointTip(point, state) {
 }
 
 /* Beside the point or in a corner: the first place that hides the fewest other points. */
-function placeOfTip(tip, [x, y], state) {
-  const [wide, tall] = [tip.offsetWidth, tip.offsetHeight];
+function placeOfTip(tip, at, state) {
+  const [x, y] = at, [wide, tall] = [tip.offsetWidth, tip.offsetHeight];
   const [right, low] = [stage.width - wide - 4, stage.height - tall - 4];
   const beside = [[x + 18, y + 14], [x - 18 - wide, y + 14], [x + 18, y - 14 - tall], [x - 18 - wide, y - 14 - tall]];
   const inside = beside.filter(([a, b]) => a >= 4 && a <= right && b >= 4 && b <= low);
+  /** @type {number[][]} */
   const others = stage.points.map(other => stage.view.toScreen(stage.where(other, state)));
+  /** @param {number[]} place */
   const hidden = ([a, b]) => others.filter(([u, v]) => u > a && u < a + wide && v > b && v < b + tall).length;
   const places = [...inside, [4, 4], [right, 4], [4, low], [right, low]];
   return places.reduce((best, place) => (hidden(place) < hidden(best) ? place : best));

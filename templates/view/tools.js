@@ -145,7 +145,7 @@ const tools = {
   /* Points of the mechanism by name, for those who do not point. */
   buildMeasure() {
     const choice = byId('measured-point');
-    choice.append(new Option('a point …', ''), ...stage.points.map((point, k) => new Option(point.name, k)));
+    choice.append(new Option('a point …', ''), ...stage.points.map((point, k) => new Option(point.name, String(k))));
     choice.addEventListener('change', () => {
       if (choice.value) measure.take(stage.points[choice.value]);
       choice.value = '';

@@ -1,0 +1,2 @@
+/* What space.js alone has; the scripts ask `isSpatial` before they use it. */
+declare const orbit: any;
