@@ -96,7 +96,7 @@ class Right:
         return Right(change(self.values), change(self.scale), change(self.floor))
 
     def rounded(self, rows: Sequence[int], sizes: Array) -> Right:
-        """Return it with what rounding takes from rows that follow from the author's formulas."""
+        """Return it with a floor of rounding for rows that follow from the author's formulas."""
         floor = self.floor.copy()
         floor[:, rows] += np.minimum(ROUNDING * finite(sizes), MOST_OF_TERMS * self.scale[:, rows])
         return replace(self, floor=floor)

@@ -28,7 +28,7 @@ from kincompile.checker.load_comparer import LoadComparer
 from kincompile.checker.reference import COMPARED, OF_LOADS, QUANTITIES, Reference, Subject
 from kincompile.checker.report import Report
 from kincompile.checker.states import given_states
-from kincompile.checker.written import TOLD, read_written, vocabulary
+from kincompile.checker.written import REPORTED, read_written, vocabulary
 from kincompile.errors import InputError
 from kincompile.names import listed
 
@@ -80,7 +80,7 @@ def compare(
     aliases
         Names of the author's own, each with its expression, for instance ``{"w": "phi3_dot"}``.
     conventions
-        What the author says that nu and gamma are: ``{"nu": "Phi_t", "gamma": "left side"}`` have
+        The author's conventions for nu and gamma: ``{"nu": "Phi_t", "gamma": "left side"}`` have
         the opposite sign, which is a mistake where it is not stated. In space ``form`` says by what
         Phi_q has derivatives, and gamma the second rates: ``"r-p"`` (ME751), ``"r-omega"`` (Haug:
         r and small rotations about the body's axes, without norm rows) or ``"global r-omega"``; the
@@ -262,7 +262,7 @@ def _read(
             written[name] = read_written(name, value, words, forms.reference, at_states, check)
             problems += check(*written[name].shape)
         except InputError as error:
-            problems += [item for item in error.problems if item != TOLD]
+            problems += [item for item in error.problems if item != REPORTED]
     if problems:
         raise InputError(problems)
     return written

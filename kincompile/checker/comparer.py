@@ -316,7 +316,7 @@ class Comparer:
         return None
 
     def _combined(self, block: ConstraintBlock, name: str) -> Diagnosis | None:
-        """Return what can be said of rows that are combinations of the right ones.
+        """Return the diagnosis of rows that are combinations of the right ones.
 
         With the same combinations of nu and gamma they give the right rates. But they are not the
         derivative of the author's Phi, nor of any where the combination varies with the position.

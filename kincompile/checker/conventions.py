@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from kincompile.checker.reference import Reference
 
 OPPOSITE = {"nu": "Phi_t", "gamma": "left side"}
-"""What an author may state that nu and gamma are; they then have the opposite sign."""
+"""Conventions that an author may state for nu and gamma; they then have the opposite sign."""
 
 USUAL = {"nu": "-Phi_t", "gamma": "right side"}
 

@@ -111,7 +111,7 @@ class Diagnostician:
     ) -> bool:
         """Return whether a single fault in vectors explains entries of Phi_q; see `explain`.
 
-        The sign of a whole row is none: that is a way to write it.
+        The sign of a whole row is not a fault: it is a way to write the row.
         """
         return any(
             fault.kind != Kind.SIGN and len(fault.result) == len(written) and _fits(fault, written)
@@ -266,7 +266,7 @@ def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:
         by_kind[Kind.MISSING_TERM] = by_kind.pop(Kind.MISSING_TERM)
     signs = [fault for fault in faults if fault.kind == Kind.SIGN]
     if Kind.TRANSPOSED in by_kind and [fault.text for fault in signs] == [TERM_SIGN]:
-        # What a transposed rotation is in one entry: told in one sentence.
+        # The sign is the effect of a transposed rotation on one entry: one sentence says both.
         cause, shown = by_kind[Kind.TRANSPOSED], by_kind.pop(Kind.SIGN)
         text = f"{shown.text}, as where {cause.text}"
         by_kind[Kind.TRANSPOSED] = replace(cause, text=text, detail=shown.detail)

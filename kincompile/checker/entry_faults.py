@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from kincompile.checker.states import Array, States
 
 MOST_TERMS = 80
-"""Longer entries are not taken apart: one term in so many is no longer recognisable."""
+"""Longer entries are not taken apart: a single term is then no longer recognisable."""
 MOST_EXPANDED = 1000
 """Terms up to which an entry is multiplied out; like ones are among them, and join."""
 

@@ -47,7 +47,7 @@ class HandFile:
     quantities: Mapping[str, Rows]  # rows of elements by quantity: Phi, Phi_q, nu, gamma, M, Q
     aliases: Mapping[str, Cell]  # the author's own names, each with its expression
     constraint: str | None
-    conventions: Mapping[str, str]  # what its author says that nu and gamma are
+    conventions: Mapping[str, str]  # the author's conventions for nu and gamma
 
 
 class _Draft:

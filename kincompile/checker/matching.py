@@ -175,7 +175,7 @@ class Matcher:
 
         The look at all of them is quick: rows in the usual order, each divided by its length.
         Where rows and columns both have another order, it sees nothing; then a few are tried. An
-        order that explains no more rows than the usual one is none: a row with the wrong sign.
+        order that explains no more rows than the usual one does not count: a sign is wrong.
         """
         layouts = [usual, *other_layouts(self._reference, usual)]
         values = self._quantities["Phi_q"].evaluate(self._subject.states).values

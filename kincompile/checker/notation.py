@@ -3,8 +3,8 @@ r"""What people write instead of plain text: Greek letters, LaTeX, degree signs,
     \Phi_q = \begin{bmatrix} 1 & 0 & \frac{L}{2}\sin\phi_1 \\ 0 & 1 & -\cos\phi_1 \end{bmatrix}
     nu = [0, 0, 30°]
 
-A text without a backslash and without other than ASCII characters stays as it is, so that places in
-it can be told.
+A text without a backslash and without other than ASCII characters stays as it is, so that
+messages can name places in it.
 """
 
 from __future__ import annotations

@@ -40,8 +40,8 @@ MAX_ALIASES = 1000
 MAX_SIZE = 1_000_000
 """Characters of all formulas and parts with aliases written out; as many take about 10 s."""
 
-TOLD = ""
-"""A problem that was told before: all that a quantity has are names unknown elsewhere too."""
+REPORTED = ""
+"""Placeholder for a quantity whose unknown names have all been reported already."""
 MATRICES, MOVING = ("Phi_q", "M"), ("gamma", "Q")
 """Quantities with a column for each coordinate, and those that depend on rates."""
 
@@ -57,7 +57,7 @@ class Written:
     evaluate: Callable[[States], Given]
     # The formulas, row by row; None for functions and arrays.
     expressions: tuple[sympy.Expr, ...] | None = None
-    # What rounding that is, in words.
+    # Its rounding, in words.
     rounding: str = "numbers are rounded; they count to half of their last digit"
     # Whether it may be evaluated at other parameters than the default ones.
     takes_parameters: bool = True
@@ -70,7 +70,7 @@ class Written:
         return len(self.texts), len(self.texts[0])
 
     def formula(self, row: int, column: int) -> sympy.Expr | None:
-        """Return an entry as an expression, None where it is none."""
+        """Return an entry as an expression, None of functions and arrays."""
         if self.expressions is None:
             return None
         return self.expressions[row * self.shape[1] + column]
@@ -108,7 +108,7 @@ class Vocabulary:
     refused: Mapping[str, str]
     help: str = ""
     formulas: _Formulas = field(default_factory=_Formulas)
-    told: set[str] = field(default_factory=set)
+    reported: set[str] = field(default_factory=set)
 
     def read(self, value: object) -> sympy.Expr:
         """Return a text, a `Cell`, a number or a SymPy expression in plain symbols.
@@ -116,7 +116,7 @@ class Vocabulary:
         Raises
         ------
         NotAnExpressionError
-            If it is none of these, or holds an unknown name.
+            If it has another type, or holds an unknown name.
         """
         if isinstance(value, Cell):
             return self.formulas.read(plain(value.text), value.place, self)
@@ -133,14 +133,14 @@ class Vocabulary:
         return real(expression.xreplace(meanings))
 
     def problem(self, error: NotAnExpressionError, where: str) -> str | None:
-        """Return what to say about a formula; None where its unknown name was told before."""
+        """Return what to say about a formula; None if its unknown name was reported already."""
         if not isinstance(error, UnknownNameError):
             return f"{where}{error}"
-        if error.name in self.told:
+        if error.name in self.reported:
             return None
         hint = suggestion(error.name, self.names)
-        rest = "" if self.told else f"; {self.help}"
-        self.told.add(error.name)
+        rest = "" if self.reported else f"; {self.help}"
+        self.reported.add(error.name)
         text, _, _ = str(error).partition(";")
         return f"{where}{text}{hint}{rest}"
 
@@ -272,7 +272,7 @@ def read_written(
     Raises
     ------
     InputError
-        If it is none of these, is ragged, or holds an unknown name; all problems at once.
+        If it has another type, is ragged, or holds an unknown name. One message has all problems.
     """
     if isinstance(given, list | tuple) and (numbers := _numbers(given)) is not None:
         given = numbers
@@ -303,7 +303,7 @@ def _expressions(quantity: str, rows: list[list[object]], words: Vocabulary) -> 
         if len(problems) >= MAX_PROBLEMS:
             break
     if problems:
-        raise InputError([item for item in problems if item is not None] or TOLD)
+        raise InputError([item for item in problems if item is not None] or REPORTED)
     return expressions
 
 

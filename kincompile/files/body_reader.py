@@ -39,7 +39,7 @@ class BodyReader(SketchReader):
         return other is address
 
     def body(self, address: Address, row: Row) -> Body | None:
-        """Return a body, None where its name is none or another's."""
+        """Return a body, or None if its name is invalid or already taken."""
         self.has_fields(address, row, fields_of("body", self.words.count))
         name = self.name(row, address, "a body")
         read = self._flat if self.words.count == PLANE else self._spatial

@@ -39,7 +39,7 @@ def file_content(
         If it has too many bytes.
     """
     shown = escaped(path)
-    extra = getattr(os, "O_NONBLOCK", 0)  # to open a pipe that nobody writes to
+    extra = getattr(os, "O_NONBLOCK", 0)  # to open a pipe without a writer
     if not follows_links:
         extra |= getattr(os, "O_NOFOLLOW", 0)
         if path.is_symlink():

@@ -345,7 +345,7 @@ _KINDS: Mapping[Kind, Mapping[str, Any]] = {
 
 
 def _kind(kind: Kind, count: int) -> Mapping[str, Any]:
-    """Return the schema of an argument, whose points have so many components."""
+    """Return the schema of an argument, whose points have `count` components."""
     if kind in (Kind.POINT, Kind.AXIS):
         return _components(count)
     if kind is Kind.LOADS:

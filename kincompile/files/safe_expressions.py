@@ -128,7 +128,7 @@ def parse_expression(
     except RecursionError:
         raise source.error("the expression is nested too deeply", 0) from None
     except (ArithmeticError, NotImplementedError, TypeError, ValueError) as error:
-        # SymPy's own: it takes a large factor for a prime, for one, and then finds that it is none.
+        # SymPy's own: for one, it takes a large factor for a prime and fails when it is not.
         raise source.error(
             "SymPy cannot evaluate this expression; write large numbers as decimals", 0
         ) from error

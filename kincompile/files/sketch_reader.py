@@ -72,7 +72,7 @@ class SketchReader(FieldReader):
         return mechanism
 
     def _within(self, given: Row, section: str, kind: list[Any] | Row) -> Any:
-        """Return a list or table of the drawing, empty where it is none, or a very large one."""
+        """Return a list or table of the drawing; empty if of another type or too long."""
         found = given.get(section, kind)
         address, what = (*PLACE, section), "list" if isinstance(kind, list) else "table"
         if not isinstance(found, type(kind)):

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Values from one to another: so many equally spaced ones, or as many as there are samples."""
+    """Equally spaced values from one to another, `count` or as many as there are samples."""
 
     first: float
     last: float
@@ -98,7 +98,7 @@ class _TableReader(FieldReader):
     def _require_samples(
         self, parameters: Mapping[str, tuple[float, ...] | Span], samples: int | None
     ) -> None:
-        """Report spans that nobody says the number of values of."""
+        """Report spans without a number of values."""
         for name, value in parameters.items():
             if isinstance(value, Span) and value.count is None and samples is None:
                 text = "give it a count of equally spaced values, or the sweep a number of samples"
