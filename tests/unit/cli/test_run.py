@@ -169,7 +169,7 @@ def test_that_a_motion_goes_through_a_bifurcation_where_it_is_told_to(process, t
     model.write_text(PARALLELOGRAM)
     stopped = process("run", model)
     assert stopped.returncode == 3
-    assert "--through smooth, goes on along the smooth branch" in stopped.stderr
+    assert "--through smooth, follows the smooth branch" in stopped.stderr
     for command, output in (("run", table), ("view", page)):
         done = process(command, model, "--through", "smooth", "-o", output)
         assert (done.returncode, output.exists()) == (0, True)
