@@ -18,10 +18,11 @@ print("\\nLOADED", *sys.modules)
 PAGES = "kincompile.view kincompile.derivations kincompile.checker kincompile.verification"
 LARGE = "kincompile.ir.grouping kincompile.emitters.numpy.grouped"
 EXTRA = "rich platformdirs matplotlib scipy kincompile.runtime.native"
-LANGUAGES = (
+OTHERS = (
     "kincompile.emitters.c kincompile.emitters.octave kincompile.emitters.javascript "
-    "kincompile.emitters.rust kincompile.solver"
+    "kincompile.emitters.rust"
 )
+LANGUAGES = f"{OTHERS} kincompile.solver"  # a NumPy file ends with the march of the solver's text
 EMITTING = "kincompile.compiler kincompile.ir kincompile.emitters jinja2"
 RANK = "kincompile.ir.redundancy kincompile.structure.rank kincompile.structure.report"
 
@@ -45,7 +46,7 @@ NOT_LOADED = {
         f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivations kincompile.checker "
         "kincompile.verification"
     ),
-    "compile MODEL -o -": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} {RANK} kincompile.runtime scipy",
+    "compile MODEL -o -": f"{PAGES} {LARGE} {EXTRA} {OTHERS} {RANK} kincompile.runtime scipy",
     "compile MODEL -o - --target javascript": (
         f"{PAGES} {LARGE} {EXTRA} {RANK} kincompile.runtime kincompile.emitters.numpy "
         "kincompile.emitters.c kincompile.emitters.octave"
