@@ -34,7 +34,7 @@ from kincompile.model.spline import PeriodicSpline, fit
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from kincompile.calculus.template import Template
     from kincompile.model.arguments import Argument
@@ -203,13 +203,30 @@ def resolve_joint(constraint: Constraint, scope: Scope) -> Joint | None:
     )
 
 
-def beside(joint: Joint, joints: Sequence[Joint]) -> Joint:
-    """Return a joint as it holds beside the driver of its angle, if one of `joints` is that."""
-    kind = joint.written.driven_by
-    for item in joints:
-        if kind is None or not isinstance(item.written, kind) or item.bodies != joint.bodies:
-            continue
-        if item.points.items() <= joint.points.items():
+def beside_drivers(
+    resolved: Sequence[Joint | FreeEquation],
+) -> tuple[Joint | FreeEquation, ...]:
+    """Return joints and equations, each joint as it holds beside the driver of its angle."""
+    joints = [item for item in resolved if isinstance(item, Joint)]
+    kinds = {item.written.driven_by for item in joints} - {None}
+    drivers = [item for item in joints if type(item.written) in kinds]
+    by_bodies: dict[tuple[str, ...], list[Joint]] = {}
+    for item in drivers:
+        by_bodies.setdefault(_pair(item), []).append(item)
+    return tuple(
+        _beside(item, by_bodies.get(_pair(item), ())) if isinstance(item, Joint) else item
+        for item in resolved
+    )
+
+
+def _pair(joint: Joint) -> tuple[str, ...]:
+    return tuple(body.name for body in joint.bodies)
+
+
+def _beside(joint: Joint, drivers: Iterable[Joint]) -> Joint:
+    for item in drivers:
+        driven = type(item.written) is joint.written.driven_by
+        if driven and item.points.items() <= joint.points.items():
             scalars = {**joint.scalars, "C": item.scalars["C"]}
             return replace(joint, template=joint.written.driven_template(), scalars=scalars)
     return joint

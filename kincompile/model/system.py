@@ -35,7 +35,7 @@ from kincompile.model.outputs import (
     resolved_observers,
 )
 from kincompile.model.points import BodyPoint, PlacedPoint
-from kincompile.model.resolve import FreeEquation, Joint, beside, resolve_equation, resolve_joint
+from kincompile.model.resolve import FreeEquation, Joint, beside_drivers, resolve_equation, resolve_joint
 from kincompile.model.scope import Scope
 from kincompile.model.text_views import TextViews
 
@@ -309,6 +309,4 @@ def _resolved(
         resolve_equation(item, scope) if isinstance(item, Equation) else resolve_joint(item, scope)
         for item in written
     )
-    known = [item for item in found if item is not None]
-    joints = [item for item in known if isinstance(item, Joint)]
-    return tuple(beside(item, joints) if isinstance(item, Joint) else item for item in known)
+    return beside_drivers([item for item in found if item is not None])
