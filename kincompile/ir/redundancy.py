@@ -217,7 +217,7 @@ def _rates(
     """Return the rows that drivers would add to Phi_q, (k, n), of length one in scales; weights."""
     if not drivers:
         return np.zeros((0, ranks.scale.size)), np.zeros(0)
-    _, Phi_q = _evaluation(lower(system.constrained_by(drivers)))(*ranks.state)
+    _, Phi_q = _evaluation(lower(system.rewritten(system.constraints, drivers)))(*ranks.state)
     rows = Phi_q[0, -len(drivers) :] * ranks.scale
     angles = [any(x.unit == "rad" for x in item.arguments().values()) for item in drivers]
     return (

@@ -35,7 +35,13 @@ from kincompile.model.outputs import (
     resolved_observers,
 )
 from kincompile.model.points import BodyPoint, PlacedPoint
-from kincompile.model.resolve import FreeEquation, Joint, beside_drivers, resolve_equation, resolve_joint
+from kincompile.model.resolve import (
+    FreeEquation,
+    Joint,
+    beside_drivers,
+    resolve_equation,
+    resolve_joint,
+)
 from kincompile.model.scope import Scope
 from kincompile.model.text_views import TextViews
 
@@ -196,12 +202,28 @@ class ConstraintSystem(MatrixViews, TextViews):
         observers = resolved_observers(points, spins, scope, self.length_unit)
         return self._with({"body_points": tuple(points), "observers": observers, "loads": ()})
 
-    def constrained_by(self, more: Sequence[Constraint]) -> ConstraintSystem:
-        """Return the system with more constraints of known types, and no outputs and loads."""
-        scope = _scope(self.bodies, self.coordinates, self.parameters, [], self.ground)
-        constraints = (*self.constraints, *_resolved(list(more), scope))
-        names = tuple(name for item in constraints for name in item.equation_names)
-        changed = {"constraints": constraints, "equations": names, "observers": (), "loads": ()}
+    def rewritten(
+        self,
+        constraints: Sequence[Joint | FreeEquation],
+        more: Sequence[Constraint | Equation],
+        parameters: Sequence[Parameter] = (),
+    ) -> ConstraintSystem:
+        """Return the system with its constraints changed, more of them and of parameters.
+
+        It has no loads.
+
+        Raises
+        ------
+        ModelError
+            If one of those that come new cannot be used as written.
+        """
+        every = (*self.parameters, *parameters)
+        scope = _scope(self.bodies, self.coordinates, every, [], self.ground)
+        found = beside_drivers([*constraints, *_resolved(list(more), scope)])
+        if scope.problems:
+            raise ModelError(scope.problems)
+        names = tuple(name for item in found for name in item.equation_names)
+        changed = {"constraints": found, "equations": names, "parameters": every, "loads": ()}
         return self._with(changed)
 
     def _with(self, changed: Mapping[str, Any]) -> ConstraintSystem:

@@ -42,7 +42,8 @@ GROUND = {name for name, floor in FLOORS.items() if floor == 0}
 RUNTIME = "runtime"
 BOTH_SIDES = {
     *("__init__", "__main__", "compiler", "cli", "spatial"),
-    *("checker", "derivations", "design", "exercises", "sweeps", "verification", "view"),
+    *("checker", "derivations", "design", "exercises", "sweeps"),
+    *("transmissions", "verification", "view"),
 }
 
 # Modules that may import kincompile inside a function. The lazy table of public names is what the

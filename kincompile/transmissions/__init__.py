@@ -1,0 +1,1 @@
+"""A mechanism as a function from inputs to outputs, with its derivatives."""

@@ -1,0 +1,265 @@
+"""From a mechanism and names to a loop that is a function: as many freedoms as inputs.
+
+What no output sees may move as it likes, as a rod between two balls turns about its own axis; a
+position needs it all the same, so it is held.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy
+
+from kincompile.errors import InputError
+from kincompile.ir.interpret import interpret
+from kincompile.ir.lower import lower
+from kincompile.ir.redundancy import missing_drivers, rank_report
+from kincompile.model.equation import Equation
+from kincompile.model.inputs import input_name, with_inputs
+from kincompile.names import column_name, listed, unknown
+from kincompile.space.points import SpatialPoint
+from kincompile.space.primitives import Dot1
+from kincompile.structure.rank import ANGLES_FIRST, DEPENDENT, drivers_of
+from kincompile.structure.remedies import advice
+from kincompile.tables import counted
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from kincompile.ir.program import Program
+    from kincompile.model.constraint import Constraint
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
+    from kincompile.structure.rank import RankReport
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """A mechanism as a function of its inputs: what a transmission is compiled from.
+
+    Attributes
+    ----------
+    system : ConstraintSystem
+        The mechanism whose inputs are parameters, with what is held.
+    inputs : tuple of str
+        Names of drivers and coordinates.
+    parameters : tuple of str
+        The parameters that they are: the last of the system.
+    outputs : tuple of str
+        Coordinates and outputs of the system, the components of points one by one.
+    held : tuple of str
+        Freedoms that no output sees: coordinates, and ``"spin of rod"`` of a body in space.
+    """
+
+    system: ConstraintSystem
+    inputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+    outputs: tuple[str, ...]
+    held: tuple[str, ...]
+
+
+def loop_of(
+    model: Mechanism | ConstraintSystem, inputs: Sequence[str], outputs: Sequence[str]
+) -> Loop:
+    """Return a mechanism as a function of its inputs.
+
+    Parameters
+    ----------
+    model
+        A mechanism or a system of free equations.
+    inputs
+        Names of drivers, or of other constraints that have a value, and of coordinates, as
+        ``"phi_crank"`` or ``"crank.phi"``.
+    outputs
+        Names of coordinates, outputs and points.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written; every problem is listed.
+    InputError
+        If a name is unknown, something depends on time, the inputs are not as many as the degrees
+        of freedom, or do not determine an output.
+    """
+    system, names = with_inputs(model, inputs)
+    columns = _columns(system, outputs)
+    program = lower(system)
+    ranks = rank_report(system, program)
+    matrix = interpret(program, ranks.state[0], 0 * ranks.state[0], ranks.state[1])[1][0]
+    _require_freedoms(system, names, matrix * ranks.scale)
+    held: tuple[str, ...] = ()
+    if len(ranks.motions):
+        _require_determined(system, program, ranks, names, columns)
+        held, more = _holding(system, ranks)
+        system = system.rewritten(system.constraints, more)
+    return Loop(system, names, tuple(map(input_name, names)), columns, held)
+
+
+def _columns(system: ConstraintSystem, outputs: Sequence[str]) -> tuple[str, ...]:
+    """Return the coordinates and outputs that are meant."""
+    given = {item.name: depends for item, depends in _time_of_outputs(system)}
+    points = {item.name: item.output_names for item in system.body_points}
+    coordinates = [item.name for item in system.coordinates]
+    problems: list[str] = []
+    found: list[str] = []
+    for name in map(str, outputs):
+        own = points.get(name, (column_name(name),))
+        found += own
+        if own[0] not in (*coordinates, *given):
+            text = f"{system.name} has no coordinate, output or point {name!r}"
+            known = [*points, *given, *coordinates]
+            problems.append(unknown(text, name, known, "; or ask for it with m.output"))
+        elif given.get(own[0]):
+            problems.append(
+                f"output {name!r} of {system.name} depends on t, and a transmission has no time: "
+                "write it without t."
+            )
+    problems += [
+        f"output {name!r} of {system.name} is there {count} times: name it once."
+        for name, count in Counter(found).items()
+        if count > 1
+    ]
+    if not found:
+        problems.append(
+            f"{system.name} is given no outputs: name coordinates, outputs or points. There are "
+            f"{listed([*points, *given, *coordinates])}."
+        )
+    if problems:
+        raise InputError(problems)
+    return tuple(found)
+
+
+def _time_of_outputs(system: ConstraintSystem) -> list[tuple[Any, bool]]:
+    """Return the outputs, and whether each depends on time."""
+    t = sympy.Symbol("t")
+    return [(item, t in sympy.sympify(item.expression).free_symbols) for item in system.outputs]
+
+
+def _require_freedoms(system: ConstraintSystem, names: Sequence[str], matrix: Array) -> None:
+    """Refuse more inputs than there are degrees of freedom, given Phi_q (m, n) in scales."""
+    equations = [name if name in system.equations else f"input_{name}" for name in names]
+    rows = [system.equations.index(name) for name in equations]
+    others = np.delete(matrix, rows, axis=0)
+    freedoms = _rank(matrix) - _rank(others)
+    if freedoms < len(names):
+        raise InputError(
+            f"{system.name} has {counted(freedoms, 'degree')} of freedom for the inputs "
+            f"{listed(names)}: leave out {len(names) - freedoms} of them. A driver with a number "
+            "as its value counts as a joint: name it as an input, not the coordinate that it holds."
+        )
+
+
+def _rank(matrix: Array) -> int:
+    lengths = np.linalg.norm(matrix, axis=1, keepdims=True)
+    if not lengths.all() or not matrix.size:
+        matrix, lengths = matrix[lengths[:, 0] > 0], lengths[lengths > 0][:, np.newaxis]
+    return int(np.linalg.matrix_rank(matrix / lengths, DEPENDENT)) if matrix.size else 0
+
+
+def _require_determined(
+    system: ConstraintSystem,
+    program: Program,
+    ranks: RankReport,
+    names: Sequence[str],
+    columns: Sequence[str],
+) -> None:
+    """Refuse outputs that move while all inputs rest."""
+    places = [item.name for item in system.coordinates]
+    moving = {places[k] for k in np.flatnonzero(np.abs(ranks.motions).max(axis=0) > DEPENDENT)}
+    if outputs := system.outputs:
+        count = len(ranks.motions)
+        q = np.repeat(ranks.state[0], count, axis=0)
+        q_dot, t = ranks.motions * ranks.scale, np.repeat(ranks.state[1], count)
+        first, rates = (interpret(program, q, x, t) for x in (0 * q_dot, q_dot))
+        apart = np.abs(np.array(rates[4:6]) - np.array(first[4:6])).max(axis=(0, 1))
+        sizes = 1 + np.abs(first[4][0])
+        found = zip(outputs, apart / sizes, strict=True)
+        moving |= {item.name for item, x in found if x > DEPENDENT}
+    if wrong := [name for name in columns if name in moving]:
+        missing = missing_drivers(system, ranks)
+        raise InputError(
+            f"the inputs {listed(names)} of {system.name} do not determine {listed(wrong)}: "
+            f"{counted(len(ranks.motions), 'degree')} of freedom left. Name more inputs, a "
+            f"coordinate or a driver for each; {advice(missing)}."
+        )
+
+
+def _holding(
+    system: ConstraintSystem, ranks: RankReport
+) -> tuple[tuple[str, ...], list[Constraint | Equation]]:
+    """Return names of freedoms, and constraints that hold them as they are at the start."""
+    names = [item.name for item in system.coordinates]
+    solids = {body.name: body for body in system.bodies if body.on_request}
+    turns = {name for body in solids.values() for name in body.coordinates[3:]}
+    frames = _Frames.of(system, list(solids.values()), ranks)
+    rows, weights, wanted = [], [], []
+    for name, row, item in zip(names, np.eye(len(names)), system.coordinates, strict=True):
+        if name not in turns:
+            rows.append(row)
+            weights.append(ANGLES_FIRST if item.unit == "rad" else 1.0)
+            wanted.append(name)
+    for body in solids:
+        for row in frames.spins[body] * ranks.scale:
+            rows.append(row / np.linalg.norm(row))
+            weights.append(ANGLES_FIRST)
+            wanted.append(body)
+    taken, _ = drivers_of(ranks.motions, np.array(rows), np.array(weights))
+    held: list[str] = []
+    more: list[Constraint | Equation] = []
+    for number, k in enumerate(taken, start=1):
+        name, title = wanted[k], f"held_{number}"
+        if name in solids:
+            held.append(f"spin of {name}")
+            motion = ranks.motions.T @ (ranks.motions @ rows[k]) * ranks.scale
+            vectors = frames.across(name, frames.spins[name] @ motion)
+            more.append(Dot1(title, system.ground, vectors[0], solids[name], vectors[1], 0))
+        else:
+            held.append(name)
+            value = float(ranks.nearest[names.index(name)])
+            more.append(Equation(title, sympy.Symbol(name) - value))
+    return tuple(held), more
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Frames:
+    """Bodies in space at the generic state and at the start."""
+
+    # Angular velocity in body-fixed components per rate of each coordinate, (3, n), at the state.
+    spins: dict[str, Array]
+    turned: dict[str, Array]  # A (3, 3) at the start
+
+    @classmethod
+    def of(cls, system: ConstraintSystem, bodies: Sequence[Any], ranks: RankReport) -> _Frames:
+        """Evaluate the frames of bodies."""
+        if not bodies:
+            return cls({}, {})
+        ends = (np.zeros(3), *np.eye(3))
+        points = [SpatialPoint(x.name, x, tuple(end.tolist())) for x in bodies for end in ends]
+        program, n = lower(system.observing(points)), len(system.coordinates)
+        rest, t = np.zeros((1, n)), ranks.state[1]
+        places = interpret(program, ranks.nearest[np.newaxis], rest, t)[4][0, : 12 * len(bodies)]
+        states = np.repeat(ranks.state[0], n, axis=0), np.eye(n), np.repeat(t, n)
+        rates = interpret(program, *states)[4][:, 12 * len(bodies) :].T.reshape(-1, 2, 3, n)
+        names = [body.name for body in bodies]
+        origins, axes = np.split(places.reshape(-1, 4, 3), (1,), axis=1)
+        return cls(
+            dict(zip(names, rates[:, 1], strict=True)),
+            dict(zip(names, (axes - origins).swapaxes(1, 2), strict=True)),
+        )
+
+    def across(self, name: str, axis: Array) -> tuple[tuple[float, ...], ...]:
+        """Return directions of the ground and of a body, at right angles to an axis.
+
+        Their scalar product is zero at the start, and changes as the body turns about the axis.
+        """
+        across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        still = self.turned[name] @ np.cross(axis, across)
+        first, second = (x / np.linalg.norm(x) for x in (still, across))
+        return tuple(first.tolist()), tuple(second.tolist())
