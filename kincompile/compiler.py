@@ -36,7 +36,7 @@ from kincompile.errors import (
 from kincompile.ir.inline import InlineProgram, inline
 from kincompile.ir.lower import lower
 from kincompile.model.mechanism import Mechanism, system_of
-from kincompile.model.origins import remember_model
+from kincompile.model.system import remember_model
 from kincompile.names import listed
 from kincompile.structure.counting import counting_problem
 

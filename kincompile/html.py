@@ -1,13 +1,20 @@
-"""HTML for notebooks: tables, whole pages in a frame, and pictures, which `view` draws."""
+"""HTML for notebooks: tables, pages in a frame, plots, and pictures, which `view` draws."""
 
 from __future__ import annotations
 
+from base64 import b64encode
 from functools import singledispatch
 from html import escape
+from io import BytesIO
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
+
+    from matplotlib.figure import Figure
+
+RESOLUTION = 100
+"""Of plots [dots per inch]."""
 
 
 @singledispatch
@@ -73,3 +80,22 @@ def framed_html(page: str, title: str, height: str) -> str:
         f'<iframe srcdoc="{escape(page)}" title="{escape(title)}" '
         f'style="width: 100%; height: {height}; border: 0"></iframe>'
     )
+
+
+def figure_html(title: str, size: tuple[float, float], draw: Callable[[Figure], object]) -> str:
+    """Return a matplotlib figure as an image element that carries its own bytes.
+
+    It is "" where matplotlib is not installed. `title` says what it shows, for those who cannot see
+    it; `size` is width and height [inch]; `draw` draws into the empty figure, which pyplot does not
+    know.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        return ""
+    figure = Figure(figsize=size, layout="constrained", dpi=RESOLUTION)
+    draw(figure)
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png")
+    data = b64encode(buffer.getvalue()).decode("ascii")
+    return f'<p><img alt="{escape(title)}" src="data:image/png;base64,{data}"/></p>'

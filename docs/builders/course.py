@@ -14,8 +14,8 @@ from markdown_it import MarkdownIt
 
 import kincompile as kc
 from docs.builders.places import DOCS, write
-from kincompile.derivations.document import Figure
-from kincompile.derivations.svg import standalone_svg
+from kincompile.report.document import Figure
+from kincompile.report.figure import standalone_svg
 
 if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism

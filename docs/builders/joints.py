@@ -12,10 +12,10 @@ import sympy
 import kincompile as kc
 from docs.builders.places import DOCS
 from docs.builders.space import alone
-from kincompile.derivations.document import Figure
 from kincompile.derivations.slides import ATTRIBUTES
-from kincompile.derivations.svg import standalone_svg
 from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.report.document import Figure
+from kincompile.report.figure import standalone_svg
 from kincompile.space.catalogue import CONSTRAINTS as IN_SPACE
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kincompile.checker.comparison import ComparedEntry, Convention, Verdict, worst
-from kincompile.emitters.templates import fill, read
 from kincompile.html import Shown, framed_html
+from kincompile.report.templates import fill, read
 from kincompile.tables import indented, table
 
 if TYPE_CHECKING:

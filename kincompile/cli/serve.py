@@ -13,7 +13,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import TYPE_CHECKING, Any
 
-from kincompile.emitters.templates import fill, read
+from kincompile.report.templates import fill, read
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

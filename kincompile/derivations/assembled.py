@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from kincompile.derivations.document import (
+from kincompile.derivations.evaluation import anchor, is_number
+from kincompile.report.document import (
     Chapter,
     CrossReference,
     Display,
@@ -19,8 +20,7 @@ from kincompile.derivations.document import (
     table,
     text,
 )
-from kincompile.derivations.evaluation import anchor, is_number
-from kincompile.derivations.formulas import (
+from kincompile.report.formulas import (
     DELTA_Q,
     GAMMA,
     NU,
@@ -41,11 +41,11 @@ from kincompile.tables import counted
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from kincompile.derivations.document import Block, Run, Runs
     from kincompile.derivations.evaluation import Evaluation
     from kincompile.derivations.figures import Figures
     from kincompile.ir.inline import Entry
     from kincompile.model.bodies import Body
+    from kincompile.report.document import Block, Run, Runs
     from kincompile.runtime.newton import NewtonResult
 
     Rows: TypeAlias = list[tuple[Run | Runs, ...]]

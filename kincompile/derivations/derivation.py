@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.derivations.assembled import assembled_section, unknowns_section
-from kincompile.derivations.document import LEVELS, Chapter, Manuscript, of_levels
 from kincompile.derivations.equation_section import equation_section
 from kincompile.derivations.evaluation import Evaluation, evaluation
 from kincompile.derivations.figures import Figures
@@ -22,10 +21,6 @@ from kincompile.derivations.joint_section import joint_section
 from kincompile.derivations.joint_terms import abbreviations
 from kincompile.derivations.load_section import load_abbreviations, loads_section
 from kincompile.derivations.slides import slides_of
-from kincompile.derivations.to_html import as_html
-from kincompile.derivations.to_latex import as_tex
-from kincompile.derivations.to_markdown import as_markdown
-from kincompile.derivations.to_notebook import as_notebook
 from kincompile.derivations.turned_section import R_OMEGA, turned_section
 from kincompile.errors import InputError
 from kincompile.html import framed_html
@@ -33,6 +28,11 @@ from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint
 from kincompile.model.small_rotations import BY_OMEGA, BY_P, is_norm, turned_joint
 from kincompile.names import listed, suggestion
+from kincompile.report.document import LEVELS, Chapter, Manuscript, of_levels
+from kincompile.report.to_html import as_html
+from kincompile.report.to_latex import as_tex
+from kincompile.report.to_markdown import as_markdown
+from kincompile.report.to_notebook import as_notebook
 from kincompile.tables import counted
 from kincompile.writing import write_atomically
 
@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from kincompile.calculus.expressions import Expression
-    from kincompile.derivations.formulas import Glyph
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
+    from kincompile.report.formulas import Glyph
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

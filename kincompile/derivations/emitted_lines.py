@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING
 
-from kincompile.derivations.document import SourceLine
 from kincompile.quantities import OF_EQUATIONS, kernels
+from kincompile.report.document import SourceLine
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

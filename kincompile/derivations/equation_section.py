@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 
 import sympy
 
-from kincompile.derivations.document import Chapter, Display, Math, Verbatim, table, text
-from kincompile.derivations.formulas import DerivativeSymbol, Equated
 from kincompile.derivations.steps import Steps
 from kincompile.derive.equations import EquationDerivatives, derive_equation
+from kincompile.report.document import Chapter, Display, Math, Verbatim, table, text
+from kincompile.report.formulas import DerivativeSymbol, Equated
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from kincompile.derivations.document import Run, Runs
     from kincompile.derivations.evaluation import Evaluation
-    from kincompile.derivations.formulas import Glyph
     from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.model.resolve import FreeEquation
+    from kincompile.report.document import Run, Runs
+    from kincompile.report.formulas import Glyph
 
 
 def equation_section(evaluation: Evaluation, equation: FreeEquation, rows: Rows) -> Chapter:

@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kincompile.calculus.expressions import Symbol
-from kincompile.derivations.document import Display, Math
 from kincompile.derivations.emitted_lines import emitted_lines
 from kincompile.derivations.expanded import Writer
-from kincompile.derivations.formulas import Decimal, DerivativeSymbol, Equated, Glyph, size
 from kincompile.derivations.positions import followed, generic_time, newton_table
 from kincompile.emitters.emission import emit_program
 from kincompile.errors import InputError
 from kincompile.ir.inline import InlineProgram, inline
 from kincompile.ir.lower import lower
 from kincompile.names import listed, rate, suggestion
+from kincompile.report.document import Display, Math
+from kincompile.report.formulas import Decimal, DerivativeSymbol, Equated, Glyph, size
 from kincompile.runtime.load import from_source
 from kincompile.runtime.newton import NewtonResult, newton
 from kincompile.runtime.status import Status
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from types import ModuleType
 
-    from kincompile.derivations.document import SourceLine
     from kincompile.derivations.emitted_lines import EntryKey
-    from kincompile.derivations.formulas import Formula
     from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.ir.inline import Entry
     from kincompile.model.system import ConstraintSystem
+    from kincompile.report.document import SourceLine
+    from kincompile.report.formulas import Formula
 
 Array = NDArray[np.float64]
 

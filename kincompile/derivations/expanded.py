@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from kincompile.calculus.expressions import Number, Pi, Power, Product, Scalar, Sum, Symbol
-from kincompile.derivations.formulas import Call, Choice, Decimal, Quotient, Relation
+from kincompile.report.formulas import Call, Choice, Decimal, Quotient, Relation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -25,13 +25,14 @@ from kincompile.model.symbolic import SymbolicEnvironment
 from kincompile.view.drawing import drawing
 from kincompile.view.geometry import Geometry
 from kincompile.view.marks import GROUND_FRAME, FramePoint
-from kincompile.view.picture import Arrow, Picture, picture
+from kincompile.view.picture import Arrow, picture
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from kincompile.calculus.expressions import Vector
     from kincompile.derivations.evaluation import Evaluation
+    from kincompile.report.picture import Picture
     from kincompile.view.drawing import Drawing
     from kincompile.view.marks import Array, BodyFrame
 

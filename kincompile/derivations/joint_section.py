@@ -11,30 +11,6 @@ import sympy
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import ZERO, TimeFunction, Vector, VectorSymbol
 from kincompile.calculus.expressions import Symbol as Letter
-from kincompile.derivations.document import (
-    Chapter,
-    Display,
-    Figure,
-    Math,
-    Verbatim,
-    table,
-    text,
-)
-from kincompile.derivations.formulas import (
-    GAMMA_TERMS,
-    PHI_Q,
-    PHI_T,
-    ZERO_BLOCK,
-    Decimal,
-    DerivativeSymbol,
-    Equated,
-    Glyph,
-    Matrix,
-    Sub,
-    column,
-    decimals,
-    size,
-)
 from kincompile.derivations.joint_terms import (
     RULES,
     abbreviations,
@@ -53,20 +29,44 @@ from kincompile.derive.rules import Rule
 from kincompile.model.arguments import Kind
 from kincompile.model.expressions import depends_on, evaluate
 from kincompile.model.symbolic import SymbolicEnvironment
+from kincompile.report.document import (
+    Chapter,
+    Display,
+    Figure,
+    Math,
+    Verbatim,
+    table,
+    text,
+)
+from kincompile.report.formulas import (
+    GAMMA_TERMS,
+    PHI_Q,
+    PHI_T,
+    ZERO_BLOCK,
+    Decimal,
+    DerivativeSymbol,
+    Equated,
+    Glyph,
+    Matrix,
+    Sub,
+    column,
+    decimals,
+    size,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from kincompile.calculus.expressions import Expression
-    from kincompile.derivations.document import Block, Run, Runs, Table
     from kincompile.derivations.figures import Figures
-    from kincompile.derivations.formulas import Formula
     from kincompile.derive.rules import Step
     from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Joint
     from kincompile.model.resolve_loads import AppliedLoad
-    from kincompile.view.picture import Picture
+    from kincompile.report.document import Block, Run, Runs, Table
+    from kincompile.report.formulas import Formula
+    from kincompile.report.picture import Picture
 
 
 def joint_section(figures: Figures, joint: Joint, rows: Rows) -> Chapter:

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 from kincompile.calculus import expressions as ex
 from kincompile.calculus.rotations import PlaneRotation
 from kincompile.calculus.space import EulerRotation, TurnedFrame
-from kincompile.derivations.document import Math
-from kincompile.derivations.formulas import (
+from kincompile.derive.partials import partials
+from kincompile.derive.rules import Rule, along
+from kincompile.report.document import Math
+from kincompile.report.formulas import (
     IDENTITY,
     ZERO_BLOCK,
     DerivativeSymbol,
@@ -18,16 +20,14 @@ from kincompile.derivations.formulas import (
     Joined,
     Transposed,
 )
-from kincompile.derive.partials import partials
-from kincompile.derive.rules import Rule, along
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from kincompile.calculus.template import Template
-    from kincompile.derivations.document import Runs
-    from kincompile.derivations.formulas import Formula
     from kincompile.derive.rules import Step
+    from kincompile.report.document import Runs
+    from kincompile.report.formulas import Formula
 
 _PHI = ex.Symbol("phi")
 _A, _B = Glyph("A"), Glyph("B")

@@ -18,8 +18,15 @@ from kincompile.calculus.expressions import (
     split_factor,
     sum_of,
 )
-from kincompile.derivations.document import Chapter, Display, Math, Verbatim, table, text
-from kincompile.derivations.formulas import (
+from kincompile.derivations.joint_section import attributes_table
+from kincompile.derivations.joint_terms import parts
+from kincompile.derive.loads import derive_load
+from kincompile.derive.rules import along
+from kincompile.ir.interpret import interpret
+from kincompile.model.expressions import evaluate
+from kincompile.model.matrices import load_entries
+from kincompile.report.document import Chapter, Display, Math, Verbatim, table, text
+from kincompile.report.formulas import (
     LAMBDA,
     MASS,
     Q_DDOT,
@@ -31,25 +38,18 @@ from kincompile.derivations.formulas import (
     Transposed,
     decimals,
 )
-from kincompile.derivations.joint_section import attributes_table
-from kincompile.derivations.joint_terms import parts
-from kincompile.derive.loads import derive_load
-from kincompile.derive.rules import along
-from kincompile.ir.interpret import interpret
-from kincompile.model.expressions import evaluate
-from kincompile.model.matrices import load_entries
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from kincompile.calculus.expressions import Expression
     from kincompile.calculus.symbols import Frame
-    from kincompile.derivations.document import Block, Run, Runs
     from kincompile.derivations.evaluation import Evaluation
-    from kincompile.derivations.formulas import Formula
     from kincompile.derive.loads import LoadTemplate
     from kincompile.derive.rules import Direction
     from kincompile.model.resolve_loads import AppliedLoad
+    from kincompile.report.document import Block, Run, Runs
+    from kincompile.report.formulas import Formula
 
 FORCES, DELTA = Glyph("Q"), Glyph("delta", bold=False)
 PHI_Q_TRANSPOSED = Glyph("Phi", "q", exponent="T")

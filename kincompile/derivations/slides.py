@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from kincompile.derivations.document import Chapter, Display, Figure
-from kincompile.derivations.formulas import Equated, Glyph
+from kincompile.report.document import Chapter, Display, Figure
+from kincompile.report.formulas import Equated, Glyph
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from kincompile.derivations.document import Block, Manuscript
+    from kincompile.report.document import Block, Manuscript
 
 ATTRIBUTES, CONSTRAINT, JACOBIAN, NU, GAMMA = 1, 2, 4, 5, 6
 """Steps that a slide shows a part of."""

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from kincompile.derivations.document import (
+from kincompile.report.document import (
     Chapter,
     Display,
     Math,
@@ -16,7 +16,7 @@ from kincompile.derivations.document import (
     table,
     text,
 )
-from kincompile.derivations.formulas import (
+from kincompile.report.formulas import (
     GAMMA,
     GAMMA_TERMS,
     NU,
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from kincompile.derivations.document import Block, Run, Runs
     from kincompile.derivations.evaluation import Evaluation
-    from kincompile.derivations.formulas import Formula, Glyph
     from kincompile.derive.derivation import RowBlock
     from kincompile.derive.equations import EquationDerivatives
     from kincompile.ir.inline import ConstraintRows as Rows
+    from kincompile.report.document import Block, Run, Runs
+    from kincompile.report.formulas import Formula, Glyph
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 

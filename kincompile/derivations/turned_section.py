@@ -12,28 +12,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sympy
 
-from kincompile.derivations.document import Chapter, Display, Verbatim, table, text
-from kincompile.derivations.document import Math as Formulas
-from kincompile.derivations.formulas import Decimal, DerivativeSymbol, Equated
 from kincompile.derivations.joint_section import JointSteps
 from kincompile.derivations.steps import QUANTITIES
 from kincompile.derive.derivation import derive
 from kincompile.model.expressions import evaluate
 from kincompile.model.matrices import joint_rows
 from kincompile.model.small_rotations import spin_names, turned_columns, turned_joint
+from kincompile.report.document import Chapter, Display, Verbatim, table, text
+from kincompile.report.document import Math as Formulas
+from kincompile.report.formulas import Decimal, DerivativeSymbol, Equated
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from kincompile.derivations.document import Block
     from kincompile.derivations.figures import Figures
-    from kincompile.derivations.formulas import Formula
     from kincompile.ir.inline import ConstraintRows as Rows
     from kincompile.model.expressions import Scalar
     from kincompile.model.matrices import EquationRow
     from kincompile.model.resolve import Joint
+    from kincompile.report.document import Block
+    from kincompile.report.formulas import Formula
 
 
 MOST_OPERATIONS = 120

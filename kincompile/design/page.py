@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.derivations.document import Chapter, Manuscript, table, text
-from kincompile.derivations.to_html import as_html
 from kincompile.design.fitted import DIMENSIONS, KEPT, REACHED
 from kincompile.design.tolerance_analysis import TITLES
 from kincompile.html import framed_html
+from kincompile.report.document import Chapter, Manuscript, table, text
+from kincompile.report.to_html import as_html
 from kincompile.view.page import page
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def tolerance_page(found: ToleranceAnalysis) -> str:
         rows = table(TITLES, found.rows(column, at))
         chapters.append(Chapter(column, (column,), (*said, rows)))
     plots = "\n".join(f"<h3>{column}</h3>{found.plots_html(column)}" for column in found.columns)
-    manuscript = Manuscript(found.name, found.headline(), tuple(chapters), {}, "", "")
+    manuscript = Manuscript(found.name, found.headline(), tuple(chapters))
     return as_html(manuscript, "Tolerances of", after=plots)
 
 
@@ -46,5 +46,5 @@ def fit_page(found: Fit) -> str:
         chapters.append(Chapter("limits", ("Limits",), (table(KEPT, found.kept()),)))
     name = found.model.name
     moving = f"<h2>{name}</h2>{framed_html(page(found.model).html, name, HEIGHT)}"
-    manuscript = Manuscript(name, found.message, tuple(chapters), {}, "", "")
+    manuscript = Manuscript(name, found.message, tuple(chapters))
     return as_html(manuscript, "Synthesis of", after=moving)

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.errors import InputError, package_of_extra
-from kincompile.html import Shown, table_html
+from kincompile.html import Shown, figure_html, table_html
 from kincompile.names import column_name, listed, unknown
 from kincompile.runtime.results.columns import titled
-from kincompile.runtime.results.html import figure_html
 from kincompile.tables import counted, indented, table
 
 if TYPE_CHECKING:

@@ -9,13 +9,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kincompile.derivations.to_html import as_html
 from kincompile.errors import InputError
 from kincompile.exercises.blanks import Blank, choose_blanks
 from kincompile.exercises.sheet import sheet, solutions
 from kincompile.exercises.variants import Choices, variants
 from kincompile.model.mechanism import Mechanism
 from kincompile.names import rate
+from kincompile.report.to_html import as_html
 
 if TYPE_CHECKING:
     import os

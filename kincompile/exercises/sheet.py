@@ -10,7 +10,11 @@ from kincompile.calculus.expressions import Symbol, VectorSymbol
 from kincompile.calculus.space import EulerRotation
 from kincompile.derivations.assembled import EULER_PARAMETERS
 from kincompile.derivations.derivation import constraint_chapters
-from kincompile.derivations.document import (
+from kincompile.derivations.evaluation import evaluation
+from kincompile.derivations.figures import Figures
+from kincompile.model.resolve import Joint
+from kincompile.names import rate
+from kincompile.report.document import (
     Chapter,
     Display,
     Figure,
@@ -20,9 +24,7 @@ from kincompile.derivations.document import (
     table,
     text,
 )
-from kincompile.derivations.evaluation import evaluation
-from kincompile.derivations.figures import Figures
-from kincompile.derivations.formulas import (
+from kincompile.report.formulas import (
     VELOCITY_TERM,
     Call,
     DerivativeSymbol,
@@ -31,16 +33,14 @@ from kincompile.derivations.formulas import (
     Joined,
     Matrix,
 )
-from kincompile.model.resolve import Joint
-from kincompile.names import rate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from kincompile.derivations.document import Block, Run, Runs
-    from kincompile.derivations.formulas import Formula
     from kincompile.exercises.blanks import Blank
     from kincompile.model.system import ConstraintSystem
+    from kincompile.report.document import Block, Run, Runs
+    from kincompile.report.formulas import Formula
 
 RULE_STEP, BLOCK_STEP, GAMMA_STEP = 2, 3, 5
 """Steps of a derivation, from 0, that hints are taken from."""
@@ -65,7 +65,7 @@ def sheet(system: ConstraintSystem, blanks: Sequence[Blank], student: str) -> Ma
         _hints(system, blanks, chapters),
     )
     summary = f"Student {student}. Write the formulas into hand_in.txt, which has a line for each."
-    return Manuscript(system.name, summary, parts, names, "", "")
+    return Manuscript(system.name, summary, parts, names)
 
 
 def solutions(
@@ -81,7 +81,7 @@ def solutions(
         shown = table(("blank", "entry", "formula"), rows)
         chapters.append(Chapter(f"student-{student}", (f"Student {student}",), (shown,)))
     summary = f"{len(systems)} students, {len(blanks)} blanks each. Not for students."
-    return Manuscript(name, summary, tuple(chapters), {}, "", "")
+    return Manuscript(name, summary, tuple(chapters))
 
 
 def _mechanism(figures: Figures) -> Chapter:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import chain
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import sympy
 
@@ -47,6 +48,7 @@ from kincompile.model.text_views import TextViews
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
+    from types import ModuleType
 
     from kincompile.model.constraint import Constraint, Element
     from kincompile.model.expressions import Scalars
@@ -332,3 +334,18 @@ def _resolved(
         for item in written
     )
     return beside_drivers([item for item in found if item is not None])
+
+
+# An emitted module holds numbers and code only; what it looked like is remembered beside it.
+_ORIGINS: WeakKeyDictionary[ModuleType, ConstraintSystem] = WeakKeyDictionary()
+
+
+def remember_model(module: ModuleType, system: ConstraintSystem) -> ModuleType:
+    """Note the system that a module was compiled from, and return the module."""
+    _ORIGINS[module] = system
+    return module
+
+
+def model_of(module: ModuleType | None) -> ConstraintSystem | None:
+    """Return the system that a module was compiled from; None for one loaded from a file."""
+    return None if module is None else _ORIGINS.get(module)

@@ -17,12 +17,12 @@ from kincompile.calculus.expressions import (
     Symbol,
     dot,
 )
+from kincompile.calculus.space import f_i, f_j, g_i, g_j, h_i, h_j, i, j, separation
 from kincompile.calculus.symbols import C, contact_i
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import BodyLike, PointLike, ValueLike
 from kincompile.model.constraint import CamConstraint, constraint_type
 from kincompile.space.constraint import SpatialConstraint, SpatialPoints
-from kincompile.space.symbols import f_i, f_j, g_i, g_j, h_i, h_j, i, j, separation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

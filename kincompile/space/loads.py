@@ -22,6 +22,7 @@ from kincompile.calculus.expressions import (
     dot,
     vector_sum,
 )
+from kincompile.calculus.space import AXES, f_i, f_j, g_i, g_j, i, j
 from kincompile.model import arguments as argument
 from kincompile.model import loads
 from kincompile.model.arguments import BodyLike, PointLike, ValueLike
@@ -30,7 +31,6 @@ from kincompile.model.load import Load
 from kincompile.space.bodies import SPATIAL
 from kincompile.space.constraint import SpatialConstraint
 from kincompile.space.joints import JointAngle
-from kincompile.space.symbols import AXES, f_i, f_j, g_i, g_j, i, j
 from kincompile.space.triads import with_triads
 
 if TYPE_CHECKING:

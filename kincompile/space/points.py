@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, cast
 
+from kincompile.calculus.space import i
 from kincompile.model.points import BodyPoint, PointCoordinate, rate
-from kincompile.space.symbols import i
 
 if TYPE_CHECKING:
     import sympy

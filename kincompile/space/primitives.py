@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import ClassVar
 
 from kincompile.calculus.expressions import Basis, Expression, dot
+from kincompile.calculus.space import AXES, a_i, a_j, c, i, j, s_i, separation, u
 from kincompile.calculus.symbols import C
 from kincompile.model import arguments as argument
 from kincompile.model.arguments import BodyLike, PointLike, ValueLike
 from kincompile.model.constraint import constraint_type
 from kincompile.space.constraint import SpatialConstraint, SpatialPoints
-from kincompile.space.symbols import AXES, a_i, a_j, c, i, j, s_i, separation, u
 
 
 @constraint_type

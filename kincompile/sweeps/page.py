@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.derivations.document import Chapter, Manuscript, Verbatim, table, text
-from kincompile.derivations.to_html import as_html
+from kincompile.html import figure_html
+from kincompile.report.document import Chapter, Manuscript, Verbatim, table, text
+from kincompile.report.to_html import as_html
 from kincompile.runtime.results.columns import shown_unit, titled
-from kincompile.runtime.results.html import figure_html
 from kincompile.sweeps.overview import HEADER, overview
 from kincompile.sweeps.result import explained
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from kincompile.derivations.document import Block, Table
+    from kincompile.report.document import Block, Table
     from kincompile.runtime.engine.code import Array
     from kincompile.sweeps.overview import Found, Overview
     from kincompile.sweeps.result import Sweep
@@ -41,7 +41,7 @@ def sweep_page(sweep: Sweep, angle_unit: str = "rad") -> str:
         Chapter("parameters", ("Parameters",), (_parameters(sweep, angle_unit),)),
         Chapter("plots", ("Plots",), (text(_said_of_plots(seen, plots)),)),
     )
-    page = Manuscript(sweep.contents.name, str(sweep), chapters, {}, "", "")
+    page = Manuscript(sweep.contents.name, str(sweep), chapters)
     return as_html(page, "Sweep of", after=plots)
 
 

@@ -24,7 +24,7 @@ from kincompile.errors import RedundantConstraintWarning
 from kincompile.html import Shown
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
-from kincompile.model.origins import model_of
+from kincompile.model.system import model_of
 from kincompile.quantities import OF_EQUATIONS, QUANTITIES
 from kincompile.runtime.contract import check as check_contract
 from kincompile.runtime.engine.code import code_of, require_square

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.compiler import compile as compile_model
-from kincompile.emitters.templates import fill, read
 from kincompile.errors import InputError, KincompileWarning
 from kincompile.model.mechanism import system_of
 from kincompile.names import listed
+from kincompile.report.templates import fill, read
 from kincompile.runtime.singular.assemblies import assemblies
 from kincompile.runtime.solve import solve
 from kincompile.view.drawing import drawing

@@ -9,11 +9,12 @@ import numpy as np
 from kincompile.errors import InputError, package_of_extra
 from kincompile.model.mechanism import system_of
 from kincompile.names import listed, suggestion
+from kincompile.report.picture import FILL
 from kincompile.runtime.results.columns import titled
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import GROUND_FRAME
 from kincompile.view.polylines import polylines
-from kincompile.view.shapes import FILL, GROUND_COLOUR
+from kincompile.view.shapes import GROUND_COLOUR
 from kincompile.view.worlds import PLANE, in_space
 
 if TYPE_CHECKING:

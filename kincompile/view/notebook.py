@@ -7,10 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile.html import picture_html
-from kincompile.model.origins import model_of
-from kincompile.model.system import ConstraintSystem
-from kincompile.runtime.results.html import figure_html
+from kincompile.html import figure_html, picture_html
+from kincompile.model.system import ConstraintSystem, model_of
 from kincompile.runtime.results.solution import Solution
 from kincompile.view.drawing import drawing
 from kincompile.view.mechanism_plot import axes_of, draw, position_of

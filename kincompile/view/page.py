@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.compiler import compile as compile_model
-from kincompile.emitters.templates import fill, read
 from kincompile.errors import InputError, StructuralError
 from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of
+from kincompile.report.templates import fill, read
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve

@@ -10,11 +10,12 @@ import numpy as np
 
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
+from kincompile.report.picture import svg_element
 from kincompile.runtime.singular.events import DOUBTS, SENTENCES
 from kincompile.runtime.status import Status
 from kincompile.runtime.verdict import WORDS
 from kincompile.view.drawing import drawing
-from kincompile.view.picture import picture, svg_element
+from kincompile.view.picture import picture
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import kincompile.compiler as compiler
 from kincompile.criteria import SOLVED
 from kincompile.emitters.emission import emit_program
-from kincompile.emitters.javascript.dialect import JAVASCRIPT
+from kincompile.emitters.javascript.functions import JAVASCRIPT
 from kincompile.emitters.javascript.target import RESERVED
 from kincompile.emitters.lines import indented, wrapped
 from kincompile.emitters.naming import NameTable

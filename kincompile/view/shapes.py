@@ -36,12 +36,6 @@ HUES: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Colours of bodies and of paths, on light and on dark paper."""
 
-DASHES: Mapping[str, str] = {"--": "5 4", ":": "1.5 3"}
-"""Lengths of dashes and gaps, in widths of a line of the look."""
-
-FILL = 0.22
-"""Opacity of the areas of bodies."""
-
 
 def mixed(colour: str, part: float, paper: str = "#ffffff") -> str:
     """Return a colour on paper through which a part of it is seen."""

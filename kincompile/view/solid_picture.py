@@ -9,25 +9,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.report.picture import FILL, PicturePath
 from kincompile.view.marks import GROUND_FRAME, Dot, Hull, Polygon, moves_with
-from kincompile.view.picture import (
-    ASIDE,
-    MARGIN,
-    PicturePath,
-    Scale,
-    colour_of,
-    composed,
-)
+from kincompile.view.picture import ASIDE, MARGIN, Scale, colour_of, composed
 from kincompile.view.polylines import pieces
-from kincompile.view.shapes import FILL, HUES, INKS, mixed
+from kincompile.view.shapes import HUES, INKS, mixed
 from kincompile.view.solids import Position, facets_of, solids
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from kincompile.report.picture import Picture
     from kincompile.view.drawing import Drawing
     from kincompile.view.marks import Array, BodyFrame, Mark
-    from kincompile.view.picture import Arrow, Picture
+    from kincompile.view.picture import Arrow
     from kincompile.view.solids import Part, Solid
 
 VIEWS: dict[str, tuple[float, float]] = {

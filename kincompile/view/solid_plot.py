@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError
+from kincompile.report.picture import FILL
 from kincompile.runtime.results.columns import titled
 from kincompile.view.marks import GROUND_FRAME
-from kincompile.view.shapes import FILL, GROUND_COLOUR, mixed
+from kincompile.view.shapes import GROUND_COLOUR, mixed
 from kincompile.view.solid_picture import (
     ISOMETRIC,
     PLATE,

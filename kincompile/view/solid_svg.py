@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.view.picture import Scale, svg_path
+from kincompile.report.picture import svg_path
+from kincompile.view.picture import Scale
 from kincompile.view.shapes import INKS
 from kincompile.view.solid_picture import Camera, seen_paths, trace
 from kincompile.view.svg import HEIGHT, WIDTH, document

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.emitters.templates import read
+from kincompile.report.picture import DASHES, FILL
+from kincompile.report.templates import read
 from kincompile.view.marks import GROUND_FRAME, moves_with
 from kincompile.view.polylines import Polyline, polylines
-from kincompile.view.shapes import DASHES, FILL, HUES, mixed
+from kincompile.view.shapes import HUES, mixed
 from kincompile.view.worlds import in_space
 
 if TYPE_CHECKING:

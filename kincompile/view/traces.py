@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.errors import InputError
 from kincompile.model.mechanism import system_of
-from kincompile.model.origins import model_of
+from kincompile.model.system import model_of
 from kincompile.names import listed, suggestion
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.solution import Solution, require_solution

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.model.origins import remember_model
+from kincompile.model.system import remember_model
 from kincompile.quantities import functions, quantities_of, states_of
 from kincompile.runtime.engine.blocks import BlockSolver
 from kincompile.runtime.engine.code import code_of

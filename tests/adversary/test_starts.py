@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.emitters.templates import read
+from kincompile.report.templates import read
 from kincompile.runtime.corrector import iterate
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.problem import problem

@@ -31,6 +31,7 @@ FLOORS = {
     "calculus": 1,
     "derive": 2,
     "model": 3,
+    "report": 3,
     "space": 4,
     "files": 5,
     "structure": 5,

@@ -7,7 +7,7 @@ import pytest
 
 import kincompile as kc
 from kincompile import outputs
-from kincompile.model.origins import remember_model
+from kincompile.model.system import remember_model
 from kincompile.runtime.load import from_source
 
 

@@ -6,10 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from kincompile.emitters import solve_statements
-from kincompile.emitters.c.dialect import C
 from kincompile.emitters.headings import title
 from kincompile.emitters.lines import braced
-from kincompile.emitters.printer import Printer
+from kincompile.emitters.printer import ELEMENTARY, Dialect, Printer
 from kincompile.emitters.solve_statements import factorization, operands, solution
 from kincompile.emitters.statements import Statements
 from kincompile.ir.graph import Graph
@@ -20,6 +19,20 @@ if TYPE_CHECKING:
     from kincompile.emitters.planned_solve import BlockCall, SolveListing
     from kincompile.ir.inline import InlineProgram
 
+C = Dialect(
+    "C",
+    {name: f"{name}({{}})" for name in ELEMENTARY}
+    # These two say by `far` that an angle is out of their reach.
+    | {"atan2": "angle_of({})"}
+    | {"cos": "cosine({}, exact, &far)", "sin": "sine({}, exact, &far)"},
+    pi="_pi",
+    nan="NAN",
+    table="spline(&{}, {}, {})",
+    signs={"&": "&&", "|": "||"},
+    # C divides integers to integers.
+    number=lambda value: repr(float(value)),
+)
+"""How C writes expressions of doubles; names that are not of math.h are the template's."""
 
 WRITE = Statements(
     "//", "const double {}", "at->{}[{}][lane]", "",

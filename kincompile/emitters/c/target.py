@@ -6,16 +6,15 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from kincompile import quantities
-from kincompile.emitters.c.dialect import C
-from kincompile.emitters.c.functions import WRITE, evaluator, solve_functions
+from kincompile.emitters.c.functions import WRITE, C, evaluator, solve_functions
 from kincompile.emitters.c.march import CSolver
 from kincompile.emitters.constants import items, named_lists
 from kincompile.emitters.lines import WIDTH, indented, wrapped
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.printer import ELEMENTARY
 from kincompile.emitters.solver_tables import NUMBERS, solver_tables
-from kincompile.emitters.templates import fill
 from kincompile.quantities import nonzeros_of
+from kincompile.report.templates import fill
 from kincompile.solver.reader import solver, start
 
 if TYPE_CHECKING:

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 from kincompile import quantities
 from kincompile.emitters import solve_statements
-from kincompile.emitters.javascript.dialect import JAVASCRIPT
 from kincompile.emitters.lines import braced, wrapped
-from kincompile.emitters.printer import Printer
+from kincompile.emitters.printer import ELEMENTARY, Dialect, Printer
 from kincompile.emitters.solve_statements import block_call, factorization, solution
 from kincompile.emitters.statements import Statements
 
@@ -19,6 +18,14 @@ if TYPE_CHECKING:
     from kincompile.emitters.planned_solve import SolveListing
     from kincompile.ir.inline import InlineProgram
     from kincompile.quantities import Quantity
+
+JAVASCRIPT = Dialect(
+    "JavaScript",
+    {name: f"Math.{name}({{}})" for name in ELEMENTARY},
+    pi="Math.PI",
+    signs={"&": "&&", "|": "||", "==": "===", "!=": "!=="},
+)
+"""How JavaScript writes expressions; `square` and `spline` are the template's."""
 
 WRITE = Statements("//", "const {}", "{}[{}]", "")
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from kincompile import criteria, quantities
 from kincompile.emitters.constants import items, named_lists, splines
-from kincompile.emitters.javascript.dialect import JAVASCRIPT
 from kincompile.emitters.javascript.functions import (
+    JAVASCRIPT,
     WRITE,
     kernel,
     single,
@@ -25,7 +25,7 @@ from kincompile.emitters.lines import indented, wrapped
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.solver_tables import solver_tables
-from kincompile.emitters.templates import fill, read
+from kincompile.report.templates import fill, read
 from kincompile.solver.reader import solver, start
 
 if TYPE_CHECKING:

@@ -13,20 +13,19 @@ import numpy as np
 from kincompile.emitters.evaluators import input_names, inputs_read, schedule
 from kincompile.emitters.lines import indented, wrapped
 from kincompile.emitters.naming import NameTable
-from kincompile.emitters.numpy.dialect import NUMPY
 from kincompile.emitters.numpy.target import (
     RESERVED,
     function_body,
     public_functions,
     support,
 )
-from kincompile.emitters.numpy.text import list_texts, solvability_text, tuple_text
+from kincompile.emitters.numpy.text import NUMPY, list_texts, solvability_text, tuple_text
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.target import Emitted
-from kincompile.emitters.templates import fill
 from kincompile.ir.graph import pruned
 from kincompile.ir.inline import ConstraintRows, Entry, InlineProgram
 from kincompile.quantities import FORMAT, functions, kernels_apart, pattern_of, states_of
+from kincompile.report.templates import fill
 from kincompile.structure.blocks import BlockForm
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from kincompile import criteria
 from kincompile.emitters.numpy.text import tuple_text
 from kincompile.emitters.solver_printer import ATOM, CHOICE, OR, OneLane
 from kincompile.emitters.solver_tables import NUMBERS, solver_tables
-from kincompile.emitters.templates import fill
+from kincompile.report.templates import fill
 from kincompile.solver.nodes import (
     LANE,
     Break,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile.emitters.lines import wrapped
-from kincompile.emitters.numpy.dialect import NUMPY
-from kincompile.emitters.numpy.text import assignments, tuple_text
+from kincompile.emitters.numpy.text import NUMPY, assignments, tuple_text
 from kincompile.emitters.planned_solve import explained
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.schedule import Assignment

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal
 from kincompile.emitters.evaluators import frames_title, varying, vectors
 from kincompile.emitters.headings import entry_titles, header, short_title, title
 from kincompile.emitters.lines import WIDTH, commented, indented, table, wrapped
-from kincompile.emitters.numpy.dialect import NUMPY
 from kincompile.emitters.numpy.solve import solve_functions
 from kincompile.emitters.numpy.text import (
+    NUMPY,
     assignments,
     element,
     list_texts,
@@ -18,8 +18,8 @@ from kincompile.emitters.numpy.text import (
     tuple_text,
 )
 from kincompile.emitters.planned_solve import schedule_solve
-from kincompile.emitters.templates import fill
 from kincompile.quantities import FORMAT, kernel_of, kernels, pattern_of, quantity_named, states_of
+from kincompile.report.templates import fill
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence

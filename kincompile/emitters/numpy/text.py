@@ -10,11 +10,21 @@ from typing import TYPE_CHECKING
 
 from kincompile.emitters.constants import named_lists
 from kincompile.emitters.lines import WIDTH, broken, indented, pieces, wrapped
+from kincompile.emitters.printer import ATOM, ELEMENTARY, POWER, Dialect
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from kincompile.ir.program import Program
+
+NUMPY = Dialect(
+    "NumPy",
+    {name: f"{name}({{}})" for name in ELEMENTARY},
+    nan="nan",
+    square=("{}**2", (ATOM,), POWER),
+    select="where({}, {}, {})",
+)
+"""How Python writes expressions; the module gives the names, for a point and for a batch."""
 
 
 def tuple_text(items: Iterable[str], room: int = WIDTH - 15) -> str:

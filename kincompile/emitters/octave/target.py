@@ -13,16 +13,15 @@ from kincompile import criteria, quantities
 from kincompile.emitters.constants import items
 from kincompile.emitters.lines import indented, pieces, wrapped
 from kincompile.emitters.naming import NameTable
-from kincompile.emitters.octave.dialect import NAMES, OCTAVE
 from kincompile.emitters.octave.march import PLACES, OctaveSolver
 from kincompile.emitters.planned_solve import schedule_determinants
-from kincompile.emitters.printer import Printer
+from kincompile.emitters.printer import ATOM, ELEMENTARY, POWER, Dialect, Printer
 from kincompile.emitters.solve_statements import factorization
 from kincompile.emitters.solver_tables import NUMBERS, solver_tables
 from kincompile.emitters.statements import Statements
-from kincompile.emitters.templates import fill
 from kincompile.errors import InputError, UnsupportedError
 from kincompile.ir.elimination import plan_solve, sizes_of
+from kincompile.report.templates import fill
 from kincompile.solver.reader import start
 from kincompile.solver.vocabulary import STATUSES
 
@@ -34,7 +33,22 @@ if TYPE_CHECKING:
     from kincompile.ir.inline import InlineProgram
     from kincompile.model.spline import SplineTable
 
-DIALECT = OCTAVE
+# Complex for some real numbers, where the other targets have NaN.
+PARTIAL = ("asin", "acos", "acosh", "atanh", "log", "sqrt", "pow")
+
+NAMES = {name: name for name in ELEMENTARY} | {"pow": "power"}
+"""Octave's names of the elementary functions."""
+
+DIALECT = Dialect(
+    "Octave",
+    {name: f"{own}({{}})" for name, own in NAMES.items()}
+    | {name: f"in_reals({NAMES[name]}({{}}))" for name in PARTIAL},
+    square=("{}^2", (ATOM,), POWER),
+    select="either({}, {}, {})",
+    table="{mechanism}_{}({}, {})",
+    signs={"&": "&&", "|": "||", "!=": "~="},
+)
+"""How Octave and MATLAB write expressions; `either` and `in_reals` are the template's."""
 
 WRITE = Statements("%", "{}", "{}({})", "{}({}, {})", "[c, -s; s, c]", first=1, continued=" ...")
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.emitters import solve_statements
 from kincompile.emitters.lines import braced, wrapped
-from kincompile.emitters.printer import Printer
-from kincompile.emitters.rust.dialect import RUST
+from kincompile.emitters.printer import ELEMENTARY, Dialect, Printer
 from kincompile.emitters.solve_statements import block_call, factorization, solution
 from kincompile.emitters.statements import Statements
 from kincompile.quantities import kernel_of, kernels_apart, pattern_of
@@ -18,6 +17,19 @@ if TYPE_CHECKING:
     from kincompile.emitters.planned_solve import SolveListing
     from kincompile.ir.inline import InlineProgram
     from kincompile.quantities import Quantity
+
+RUST = Dialect(
+    "Rust",
+    {name: f"f64::{name}({{}})" for name in ELEMENTARY}
+    | {"pow": "f64::powf({})", "log": "f64::ln({})"},
+    pi="std::f64::consts::PI",
+    nan="f64::NAN",
+    select="(if {} {{ {} }} else {{ {} }})",
+    table="spline(&{}, {}, {})",
+    signs={"&": "&&", "|": "||"},
+    number=lambda value: repr(float(value)),
+)
+"""How Rust writes expressions; `square` and `spline` are the template's."""
 
 WRITE = Statements(
     "//", "let {}", "at.{}[{}]", "", kept="{} as u8 as f64", taken="{} != 0.0", time="let t = at.t;"

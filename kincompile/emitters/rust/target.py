@@ -11,8 +11,8 @@ from kincompile.emitters.lines import indented, wrapped
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.printer import ELEMENTARY
-from kincompile.emitters.rust.dialect import RUST
 from kincompile.emitters.rust.functions import (
+    RUST,
     WRITE,
     kernel,
     single,
@@ -21,7 +21,7 @@ from kincompile.emitters.rust.functions import (
 )
 from kincompile.emitters.rust.march import BASES, RustSolver
 from kincompile.emitters.solver_tables import NUMBERS, solver_tables
-from kincompile.emitters.templates import fill
+from kincompile.report.templates import fill
 from kincompile.solver.reader import solver, start
 from kincompile.solver.vocabulary import CONSTANTS, STATUSES
 

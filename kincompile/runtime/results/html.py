@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
-from html import escape
-from io import BytesIO
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,9 +9,6 @@ import numpy as np
 from kincompile.html import table_html
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Compiled
@@ -22,9 +16,6 @@ if TYPE_CHECKING:
 
 MOST_ROWS = 30
 """Rows of a table that are shown; of more, the first ones."""
-
-RESOLUTION = 100
-"""Of images [dots per inch]."""
 
 
 def module_html(code: Compiled) -> str:
@@ -69,22 +60,3 @@ def _first_rows(name: str, title: str, header: tuple[str, ...], rows: list[tuple
     rest = len(rows) - MOST_ROWS
     more = f"<p>and {rest} more</p>" if rest > 0 else ""
     return table_html(name, title, header, rows[:MOST_ROWS]) + more
-
-
-def figure_html(title: str, size: tuple[float, float], draw: Callable[[Figure], object]) -> str:
-    """Return a matplotlib figure as an image element that carries its own bytes.
-
-    It is "" where matplotlib is not installed. `title` says what it shows, for those who cannot see
-    it; `size` is width and height [inch]; `draw` draws into the empty figure, which pyplot does not
-    know.
-    """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        return ""
-    figure = Figure(figsize=size, layout="constrained", dpi=RESOLUTION)
-    draw(figure)
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png")
-    data = b64encode(buffer.getvalue()).decode("ascii")
-    return f'<p><img alt="{escape(title)}" src="data:image/png;base64,{data}"/></p>'

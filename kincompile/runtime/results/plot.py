@@ -8,8 +8,8 @@ import numpy as np
 
 from kincompile.criteria import STILL
 from kincompile.errors import package_of_extra
+from kincompile.html import figure_html
 from kincompile.runtime.results.columns import ANGLE_UNITS, TIME_UNIT, titled
-from kincompile.runtime.results.html import figure_html
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -7,7 +7,7 @@ import pytest
 
 from kincompile.cli import derive
 from kincompile.derivations.derivation import FORMATS
-from kincompile.derivations.document import LEVELS
+from kincompile.report.document import LEVELS
 
 
 @pytest.mark.parametrize("ending", FORMATS)

@@ -8,7 +8,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.derivations.document import Chapter
+from kincompile.report.document import Chapter
 
 V, W = (0.6, 0.9), (-0.4, 0.7)
 S, P, Q = (0.25, -0.15), (-0.35, 0.45), (1.05, 0.2)

@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 
 import kincompile as kc
 from kincompile import spatial
-from kincompile.derivations.document import Figure
 from kincompile.derivations.evaluation import evaluation
 from kincompile.derivations.figures import Figures
-from kincompile.derivations.svg import as_svg
 from kincompile.model.constraint import Constraint
+from kincompile.report.document import Figure
+from kincompile.report.figure import as_svg
 from kincompile.space.catalogue import CONSTRAINTS
 from kincompile.view.picture import Arrow
 from kincompile.view.solid_picture import ISOMETRIC

@@ -8,9 +8,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.calculus.expressions import Number, Pi, Power, Product, Sum, Symbol
-from kincompile.derivations.document import Display
 from kincompile.derivations.expanded import Writer, minus
-from kincompile.derivations.formulas import Call, Choice, Decimal, Equated, Quotient, Relation
 from kincompile.derive.derivation import derive
 from kincompile.emitters.emission import emit_program
 from kincompile.ir.graph import Graph
@@ -19,6 +17,8 @@ from kincompile.ir.interpret import BINARY, FUNCTIONS
 from kincompile.ir.lower import lower
 from kincompile.model.resolve import Joint
 from kincompile.names import rate
+from kincompile.report.document import Display
+from kincompile.report.formulas import Call, Choice, Decimal, Equated, Quotient, Relation
 from kincompile.runtime.load import from_source
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")

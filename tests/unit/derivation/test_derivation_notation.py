@@ -11,7 +11,10 @@ import kincompile as kc
 from kincompile.calculus.expressions import Number, Product, Sum, Symbol, VectorSymbol
 from kincompile.calculus.rotations import turned
 from kincompile.calculus.symbols import i, j, s_i, s_j, unit
-from kincompile.derivations.formulas import (
+from kincompile.derivations.joint_terms import abbreviations
+from kincompile.derive.derivation import derive
+from kincompile.derive.partials import partials
+from kincompile.report.formulas import (
     Call,
     Choice,
     Decimal,
@@ -21,12 +24,9 @@ from kincompile.derivations.formulas import (
     Matrix,
     Relation,
 )
-from kincompile.derivations.joint_terms import abbreviations
-from kincompile.derivations.mathml import MathMLPrinter
-from kincompile.derivations.notation import split_name
-from kincompile.derivations.tex import TexPrinter, escape
-from kincompile.derive.derivation import derive
-from kincompile.derive.partials import partials
+from kincompile.report.mathml import MathMLPrinter
+from kincompile.report.notation import split_name
+from kincompile.report.tex import TexPrinter, escape
 
 
 def tex(formula: Any, names: Any = None) -> str:

@@ -8,8 +8,8 @@ import pytest
 import kincompile as kc
 from kincompile import spatial
 from kincompile.calculus.expressions import Expression
-from kincompile.derivations.document import Display, Math, Table, Verbatim
-from kincompile.derivations.formulas import Equated
+from kincompile.report.document import Display, Math, Table, Verbatim
+from kincompile.report.formulas import Equated
 from tests.unit.dynamics.test_inverse import slider_crank
 
 

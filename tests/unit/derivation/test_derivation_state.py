@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.derivations.document import CrossReference, Math, Table, Verbatim
 from kincompile.derivations.evaluation import evaluation
-from kincompile.derivations.formulas import Decimal
 from kincompile.errors import InputError
+from kincompile.report.document import CrossReference, Math, Table, Verbatim
+from kincompile.report.formulas import Decimal
 
 
 def number(run: Any) -> float:

@@ -7,11 +7,11 @@ import pytest
 
 import kincompile as kc
 from kincompile.calculus.expressions import ONE, VectorSymbol
-from kincompile.derivations.document import CrossReference, Display, Table
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import coefficient, partials
 from kincompile.derive.rules import Rule, along
 from kincompile.model.resolve import Joint
+from kincompile.report.document import CrossReference, Display, Table
 
 TITLES = (
     "1. The joint and its attributes", "2. The constraint in vectors", "3. The rules used",

@@ -10,14 +10,14 @@ import pytest
 import kincompile as kc
 from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import Number, Product, Symbol
-from kincompile.derivations.formulas import size
 from kincompile.derivations.joint_terms import abbreviations
-from kincompile.derivations.tex import TexPrinter
 from kincompile.derive import collected as collecting
 from kincompile.derive.collected import collected
 from kincompile.derive.derivation import derive
 from kincompile.errors import InternalError
 from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.report.formulas import size
+from kincompile.report.tex import TexPrinter
 
 
 class Numbers:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kincompile.emitters.numpy.dialect import NUMPY
+from kincompile.emitters.numpy.text import NUMPY
 from kincompile.emitters.printer import Printer
 from kincompile.ir.graph import Graph, operands_of
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from kincompile.emitters import templates
-from kincompile.emitters.templates import fill
 from kincompile.errors import TemplateError
+from kincompile.report import templates
+from kincompile.report.templates import fill
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from kincompile.emitters.templates import read
+from kincompile.report.templates import read
 from kincompile.view.shapes import HUES
 
 SCHEMES = ("light", "dark")

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import kincompile as kc
-from kincompile.emitters.templates import read
 from kincompile.model.mechanism import system_of
+from kincompile.report.templates import read
 from kincompile.view.drawing import drawing
 from kincompile.view.page_scripts import WORLDS, geometry_script, solver_script
 from kincompile.view.worlds import PLANE, SPACE

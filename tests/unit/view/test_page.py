@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.emitters.templates import template_root
+from kincompile.report.templates import template_root
 from kincompile.view.page import SCRIPTS, STYLES
 from kincompile.view.page_scripts import WORLDS
 

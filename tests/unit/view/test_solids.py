@@ -12,8 +12,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import kincompile as kc
-from kincompile.emitters.templates import read
 from kincompile.errors import InputError
+from kincompile.report.templates import read
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import GROUND_FRAME, FramePoint, Span, Symbol
 from kincompile.view.solid_picture import Camera

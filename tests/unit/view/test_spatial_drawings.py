@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import kincompile as kc
 from kincompile import spatial
-from kincompile.emitters.templates import read
+from kincompile.report.templates import read
 from kincompile.space.catalogue import CONSTRAINTS
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import BodyFrame, Symbol, in_ground

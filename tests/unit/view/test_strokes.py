@@ -8,7 +8,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from kincompile.emitters.templates import read
+from kincompile.report.templates import read
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import BodyFrame, Hull, Rail, Span
 from kincompile.view.polylines import of_mark, polylines

@@ -5,15 +5,15 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-from kincompile.derivations.mathml import MathMLPrinter
-from kincompile.derivations.renderer import Renderer
-from kincompile.derivations.svg import as_svg
-from kincompile.emitters.templates import fill, read
+from kincompile.report.figure import as_svg
+from kincompile.report.mathml import MathMLPrinter
+from kincompile.report.renderer import Renderer
+from kincompile.report.templates import fill, read
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from kincompile.derivations.document import (
+    from kincompile.report.document import (
         Chapter,
         CrossReference,
         Display,
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
         SourceLine,
         Table,
     )
-    from kincompile.derivations.formulas import Formula
-    from kincompile.view.picture import Picture
+    from kincompile.report.formulas import Formula
+    from kincompile.report.picture import Picture
 
 DEEPEST_IN_CONTENTS = 2
 """Depth of the list of contents, which leaves out the nine steps."""
@@ -46,7 +46,7 @@ def as_html(
     renderer = _HtmlRenderer(document)
     data = {
         "kind": kind,
-        "style": read("derivation/math.css") + read("derivation/page.css").rstrip(),
+        "style": read("report/math.css") + read("report/page.css").rstrip(),
         "title": escape(f"{title} {document.name}"),
         "heading": f"{escape(title)} <code>{escape(document.name)}</code>",
         "summary": escape(document.summary),
@@ -55,7 +55,7 @@ def as_html(
             [*(line for item in document.sections for line in renderer.section(item, 0)), after]
         ),
     }
-    return fill("derivation/page.html.jinja", data)
+    return fill("report/page.html.jinja", data)
 
 
 class _HtmlRenderer(Renderer):

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.calculus.expressions import Symbol, VectorSymbol
-from kincompile.derivations.document import CrossReference, Verbatim
-from kincompile.derivations.renderer import Renderer
-from kincompile.derivations.tex import TexPrinter, escape
-from kincompile.emitters.templates import fill
-from kincompile.view.shapes import FILL
+from kincompile.report.document import CrossReference, Verbatim
+from kincompile.report.picture import FILL
+from kincompile.report.renderer import Renderer
+from kincompile.report.templates import fill
+from kincompile.report.tex import TexPrinter, escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from kincompile.derivations.document import Chapter, Display, Manuscript, Pattern, Run, Table
-    from kincompile.derivations.formulas import Formula
-    from kincompile.view.picture import Picture, PicturePath
+    from kincompile.report.document import Chapter, Display, Manuscript, Pattern, Run, Table
+    from kincompile.report.formulas import Formula
+    from kincompile.report.picture import Picture, PicturePath
 
 HEADINGS = ("section", "subsection", "subsubsection")
 
@@ -40,7 +40,7 @@ def as_tex(document: Manuscript) -> str:
         "summary": escape(document.summary),
         "body": "\n".join(line for item in document.sections for line in renderer.section(item, 0)),
     }
-    return fill("derivation/document.tex.jinja", data)
+    return fill("report/document.tex.jinja", data)
 
 
 class _LatexRenderer(Renderer):

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 from sympy.printing.latex import LatexPrinter
 
-from kincompile.derivations.notation import GREEK, Notation
+from kincompile.report.notation import GREEK, Notation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from kincompile.derivations.formulas import Formula, Glyph
+    from kincompile.report.formulas import Formula, Glyph
 
 OPERATORS = {
     "-": "-", "<=": r"\le", ">=": r"\ge", "==": "=", "!=": r"\ne", "|": r"\vert",

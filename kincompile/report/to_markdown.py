@@ -9,15 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from kincompile.derivations.document import Math
-from kincompile.derivations.renderer import Renderer
-from kincompile.derivations.svg import svg_address
-from kincompile.derivations.tex import TexPrinter
+from kincompile.report.document import Math
+from kincompile.report.figure import svg_address
+from kincompile.report.renderer import Renderer
+from kincompile.report.tex import TexPrinter
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from kincompile.derivations.document import (
+    from kincompile.report.document import (
         Chapter,
         CrossReference,
         Display,
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
         Pattern,
         Table,
     )
-    from kincompile.derivations.formulas import Formula
-    from kincompile.view.picture import Picture
+    from kincompile.report.formulas import Formula
+    from kincompile.report.picture import Picture
 
 SPECIAL = str.maketrans({character: f"\\{character}" for character in "\\`*_{}[]<>#|$~"})
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from base64 import b64encode
 from typing import TYPE_CHECKING
 
-from kincompile.derivations.mathml import index_text, letter_text
-from kincompile.derivations.notation import has_prime, split_name
-from kincompile.view.picture import svg_element
+from kincompile.report.mathml import index_text, letter_text
+from kincompile.report.notation import has_prime, split_name
+from kincompile.report.picture import svg_element
 
 if TYPE_CHECKING:
-    from kincompile.view.picture import Picture, PictureLabel
+    from kincompile.report.picture import Picture, PictureLabel
 
 FONT = "'Kincompile Math','Latin Modern Math','STIX Two Math','Cambria Math',serif"
 """Fonts of labels; the first is that of the page."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
-from kincompile.derivations.document import (
+from kincompile.report.document import (
     CrossReference,
     Display,
     Figure,
@@ -20,9 +20,9 @@ from kincompile.derivations.document import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from kincompile.derivations.document import Block, Chapter, Run, Runs
-    from kincompile.derivations.formulas import Formula
-    from kincompile.view.picture import Picture
+    from kincompile.report.document import Block, Chapter, Run, Runs
+    from kincompile.report.formulas import Formula
+    from kincompile.report.picture import Picture
 
 
 class Renderer(ABC):

@@ -1,4 +1,4 @@
-"""A derivation page as data: sections of blocks, whatever it is printed in.
+"""A page as data: sections of blocks, whatever it is printed in.
 
 A renderer prints each kind of block; what a page says is decided before, in the modules that fill
 these classes.
@@ -6,15 +6,15 @@ these classes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from kincompile.calculus.expressions import Expression
-    from kincompile.derivations.formulas import Formula, Glyph
-    from kincompile.view.picture import Picture
+    from kincompile.report.formulas import Formula, Glyph
+    from kincompile.report.picture import Picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,9 +127,12 @@ class Manuscript:
     summary
         Sizes, and the state of the numbers, in a few words.
     sections
-        What the page says: coordinates, constraints (nine steps each), the assembled system.
+        What the page says; that of a derivation coordinates, constraints (nine steps each), the
+        assembled system.
     abbreviations
         Symbols that stand for vectors and angles which occur again and again.
+    source
+        The emitted module of a derivation.
     state
         Python code that sets t, q, q_dot and p to the state of the numbers.
     """
@@ -137,9 +140,9 @@ class Manuscript:
     name: str
     summary: str
     sections: tuple[Chapter, ...]
-    abbreviations: Mapping[Expression, Glyph]
-    source: str
-    state: str
+    abbreviations: Mapping[Expression, Glyph] = field(default_factory=dict)
+    source: str = ""
+    state: str = ""
 
 
 LEVELS = ("vector", "expanded", "numeric")

@@ -8,14 +8,14 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from kincompile.derivations.document import NotebookCode
-from kincompile.derivations.to_markdown import NOTEBOOK, MarkdownRenderer, escape
+from kincompile.report.document import NotebookCode
+from kincompile.report.to_markdown import NOTEBOOK, MarkdownRenderer, escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import TypeAlias
 
-    from kincompile.derivations.document import Chapter, Manuscript
+    from kincompile.report.document import Chapter, Manuscript
 
     Cell: TypeAlias = dict[str, object]
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.calculus import expressions as ex
 from kincompile.calculus.space import EulerRotation
-from kincompile.derivations.formulas import (
+from kincompile.derive.collected import is_rate
+from kincompile.report.formulas import (
     Call,
     Choice,
     Decimal,
@@ -28,7 +29,6 @@ from kincompile.derivations.formulas import (
     Transposed,
     size,
 )
-from kincompile.derive.collected import is_rate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

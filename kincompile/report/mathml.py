@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 from sympy.printing.mathml import MathMLPresentationPrinter
 from sympy.printing.pretty.pretty_symbology import greek_unicode
 
-from kincompile.derivations.notation import Notation
+from kincompile.report.notation import Notation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from xml.dom.minidom import Element
 
-    from kincompile.derivations.formulas import Formula, Glyph
+    from kincompile.report.formulas import Formula, Glyph
 
 OPERATORS = {
     "-": "\N{MINUS SIGN}", "<=": "\N{LESS-THAN OR EQUAL TO}", ">=": "\N{GREATER-THAN OR EQUAL TO}",
@@ -59,7 +59,7 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
     """Prints formulas as the children of a `math` element.
 
     Letters are those of Unicode's mathematical alphabets, and brackets grow with what they hold:
-    for devices without a mathematical font, a page has one (`templates/derivation/math.css`).
+    for devices without a mathematical font, a page has one (`templates/report/math.css`).
     """
 
     def __init__(self, abbreviations: Mapping[Any, Glyph] | None = None) -> None:
