@@ -18,7 +18,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "kincompile"
 
-# A module imports from lower floors or from its own folder.
+# A module imports from lower floors or from its own folder: never from a room beside its own.
 FLOORS = {
     "criteria": 0,
     "errors": 0,
@@ -36,16 +36,25 @@ FLOORS = {
     "files": 5,
     "structure": 5,
     "ir": 6,
+    "checker": 7,
     "emitters": 7,
+    "runtime": 7,
+    "compiler": 8,
+    "spatial": 8,
+    "sweeps": 9,
+    "transmissions": 9,
+    "verification": 9,
+    "view": 9,
+    "derivations": 10,
+    "design": 10,
+    "exercises": 11,
+    "__init__": 12,
+    "cli": 13,
+    "__main__": 14,
 }
 GROUND = {name for name, floor in FLOORS.items() if floor == 0}
-# Beyond the wall: it stands on the ground floor alone, and no floor stands on it.
+# Beyond the wall: it stands on the ground floor alone.
 RUNTIME = "runtime"
-BOTH_SIDES = {
-    *("__init__", "__main__", "compiler", "cli", "spatial"),
-    *("checker", "derivations", "design", "exercises", "sweeps"),
-    *("transmissions", "verification", "view"),
-}
 
 # Modules that may import kincompile inside a function. The lazy table of public names is what the
 # package promises: `import kincompile` loads nothing, a name loads its module. The table of targets
@@ -143,11 +152,11 @@ def part(module: str) -> str:
 
 def may_import(importer: str, target: str) -> bool:
     """Tell whether one part of the package may import another."""
-    if importer == target or importer in BOTH_SIDES:
+    if importer == target or target in GROUND:
         return True
-    if importer == RUNTIME or target not in FLOORS:
-        return target in GROUND
-    return FLOORS[target] < FLOORS[importer] or target in GROUND
+    if importer == RUNTIME or not {importer, target} <= FLOORS.keys():
+        return False
+    return FLOORS[target] < FLOORS[importer]
 
 
 def floor_violations(modules: Sources) -> list[str]:
@@ -230,7 +239,7 @@ def sympy_imports(modules: Sources) -> list[str]:
 
 def test_every_part_of_the_package_has_a_floor() -> None:
     parts = {part(module) for module in package_sources()}
-    assert parts - {*FLOORS, RUNTIME, *BOTH_SIDES} == set()
+    assert parts == set(FLOORS)
 
 
 def test_imports_go_down_and_do_not_cross_the_wall() -> None:
@@ -299,6 +308,8 @@ CLEAN = {
     "kincompile.emitters.c": "from kincompile.model import body",
     "kincompile.runtime": "",
     "kincompile.runtime.newton": "from kincompile.errors import SolveError\nimport numpy",
+    "kincompile.derivations": "",
+    "kincompile.view": "from kincompile.runtime import newton",
     "kincompile.cli": "import kincompile.emitters.c\nfrom kincompile.runtime import newton",
 }
 
@@ -324,6 +335,11 @@ def test_a_clean_package_passes() -> None:
         ),
         ("targets.c", "def f():\n    import kincompile.cli", "kincompile.cli"),
         ("runtime.newton", "from kincompile.model.body import Body", "kincompile.model.body"),
+        ("checker.forms", "from kincompile.runtime import newton", "kincompile.runtime.newton"),
+        ("view.page", "from kincompile.derivations.steps import steps", "kincompile.derivations"),
+        ("sweeps.page", "from kincompile.view.page import page", "kincompile.view"),
+        ("design.fit", "from kincompile import compile", "kincompile"),
+        ("exercises.kit", "from kincompile.cli import shared", "kincompile.cli"),
         ("errors", "from kincompile.model import body", "kincompile.model.body"),
     ],
 )
