@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
-DASHES: Mapping[str, str] = {"--": "5 4", ":": "1.5 3"}
+DASHES = {"--": "5 4", ":": "1.5 3"}
 """Lengths of dashes and gaps, in widths of a line."""
 
 FILL = 0.22
