@@ -112,10 +112,17 @@ def rate(name: str, order: int = 1) -> str:
     return f"{name}_{'d' * order}ot" if order else name
 
 
-def rate_of(wanted: str, known: Iterable[str]) -> tuple[str, int] | None:
-    """Return the known name of which another is the rate, and its order; None where none is."""
-    names = ((name, order) for name in known for order in range(3))
-    return next((item for item in names if rate(*item) == wanted), None)
+def rate_of(
+    given: str, known: Collection[str], orders: Sequence[int] = range(3)
+) -> tuple[str, int] | None:
+    """Return the known name whose rate of an order another is; None where there is no such one.
+
+    ``"rod.phi_dot"`` means ``"phi_rod_dot"``, the rate of order 1 of ``"phi_rod"``. A name that is
+    known itself comes before a rate.
+    """
+    wanted = column_name(given)
+    stems = ((wanted.removesuffix(rate("", order)), order) for order in orders)
+    return next((x for x in stems if rate(*x) == wanted and x[0] in known), None)
 
 
 def column_name(name: str) -> str:

@@ -9,7 +9,8 @@ import numpy as np
 
 from kincompile.criteria import probe_of
 from kincompile.errors import InputError
-from kincompile.names import column_name, rate_of, unknown
+from kincompile.names import rate
+from kincompile.runtime.column_names import column_meant
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import rate_unit
 
@@ -34,13 +35,9 @@ class Column:
 
 def column_of(code: Compiled, name: str) -> Column:
     """Return the column that a name means; refuse one that would need a third derivative of q."""
-    known = (*code.coordinates, *code.outputs)
-    wanted = column_name(str(name))
-    if found := rate_of(wanted, known):
-        _require_rate(code, *found)
-        return Column(wanted, rate_unit(code.units.get(found[0], ""), found[1]), *found)
-    text = f"{code.name} has no coordinate, point or output {name!r}"
-    raise InputError(unknown(text, wanted, known, "; add _dot or _ddot for the rates"))
+    of, order = column_meant(code.name, name, code.coordinates, code.outputs)
+    _require_rate(code, of, order)
+    return Column(rate(of, order), rate_unit(code.units.get(of, ""), order), of, order)
 
 
 def _require_rate(code: Compiled, of: str, order: int) -> None:

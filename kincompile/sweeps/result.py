@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError
-from kincompile.names import column_name, escaped, listed
+from kincompile.names import column_name, escaped, listed, unknown
 from kincompile.runtime.status import Status
 from kincompile.sweeps.layout import PENDING, STATUS
 
@@ -70,7 +70,8 @@ class Sweep:
         of_output = f"{column_name(column)}_{measure}"
         found = next((own for own in (column_name(name), of_output) if own in data), None)
         if found is None:
-            raise InputError(f"there is no {name!r} in the sweep; there are {listed(data)}.")
+            text = f"the sweep of {self.contents.name} has no column {name!r}"
+            raise InputError(unknown(text, str(name), [*data], "; name others to kc.sweep"))
         return data[found]
 
     def statuses(self) -> dict[str, int]:

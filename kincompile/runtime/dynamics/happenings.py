@@ -74,8 +74,7 @@ class Watch:
         given = [*_asked(PASSAGE, mapping_of(events, "events")),
                  *_asked(STOP, mapping_of(stops, "stops"))]  # fmt: skip
         self._kinds = [kind for kind, _, _ in given]
-        names, text = [name for _, name, _ in given], "an event is asked for at a value of"
-        self._columns = inputs.code.columns(names, text)
+        self._columns = inputs.code.columns((name for _, name, _ in given), asked="events: ")
         self._values = np.array([value for _, _, value in given])
         self._signs = np.zeros(len(given))
 

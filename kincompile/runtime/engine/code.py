@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 
 from kincompile.criteria import SPATIAL_COORDINATES, covers, may_turn, turning
 from kincompile.errors import InputError, StructuralError, UnsupportedError
-from kincompile.names import column_name, listed, unknown
+from kincompile.names import listed
 from kincompile.quantities import pattern_of
+from kincompile.runtime.column_names import VALUES, column_meant
 from kincompile.runtime.contract import functions, present_in
 
 if TYPE_CHECKING:
@@ -158,14 +160,20 @@ class Compiled:
         """Return which drivers are missing, where equations depend on others everywhere; or ""."""
         return self.request(UNDRIVEN) if UNDRIVEN in self.makers else ""
 
-    def columns(self, names: Iterable[str], text: str) -> list[int]:
-        """Return the numbers of columns among coordinates and outputs; the text refuses others."""
-        known = (*self.coordinates, *self.outputs)
-        wanted = [column_name(name) for name in names]
-        if missing := [name for name in wanted if name not in known]:
-            remedy = "; m.output(...) makes any expression an output, m.point(...) that of a body"
-            raise InputError(unknown(f"{text} {missing[0]!r}", missing[0], known, remedy))
-        return [known.index(name) for name in wanted]
+    def columns(
+        self,
+        names: Iterable[str],
+        advice: str = "m.output(...) makes any expression an output, m.point(...) that of a body",
+        asked: str = "",
+    ) -> list[int]:
+        """Return the numbers of columns among coordinates and outputs; rates are refused.
+
+        A message begins with what is `asked` for, and ends with the advice.
+        """
+        known = self.coordinates, self.outputs
+        owner, numbers = f"{asked}{self.name}", {x: k for k, x in enumerate(chain(*known))}
+        found = (column_meant(owner, x, *known, orders=VALUES, advice=advice) for x in names)
+        return [numbers[name] for name, _ in found]
 
     def owners(self) -> dict[str, str]:
         """Return the body of each coordinate; one that belongs to none stands for itself."""

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError, package_of_extra
-from kincompile.names import column_name, listed, rate, suggestion
+from kincompile.names import rate, rate_of
+from kincompile.runtime.column_names import column_meant
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -187,21 +188,15 @@ class MotionTable:
         InputError
             When no column has this name; the message lists those that exist.
         """
-        wanted = column_name(str(name))
-        stems = ((wanted.removesuffix(rate("", order)), order) for order in range(3))
-        known = [(stem, order) for stem, order in stems if rate(stem, order) == wanted]
-        for stem, order in known:
-            if stem in self.coordinates or stem in self.observed.names:
-                return self._column(stem, order)
-        for stem, order in known:  # on request these are compiled, so they come last
-            if wanted != name and stem in self.joints.names:
-                return self.joints.column(stem, order)
-        near = suggestion(wanted, (column.name for column in self.columns())) or "."
-        outputs = f", the outputs {listed(self.observed.names)}" if self.observed.names else ""
-        raise InputError(
-            f"{self.name} has no column {name!r}{near} The coordinates are "
-            f"{listed(self.coordinates)}{outputs}; add _dot or _ddot for the rates."
-        )
+        outputs = self.observed.names
+        try:
+            return self._column(*column_meant(self.name, name, self.coordinates, outputs))
+        except InputError:
+            # Points of joints are compiled on request, so they come last.
+            found = rate_of(name, self.joints.names) if "." in str(name) else None
+            if found is None:
+                raise
+        return self.joints.column(*found)
 
     def columns(self) -> list[Column]:
         """Return the coordinates and outputs, then their rates, then their second rates."""

@@ -21,13 +21,12 @@ from kincompile.criteria import AGREEMENT, SOLVED
 from kincompile.errors import InputError
 from kincompile.html import Shown
 from kincompile.names import (
-    column_name,
     listed,
     parameters_problem,
     quotient_unit,
-    rate_of,
     unknown,
 )
+from kincompile.runtime.column_names import column_meant
 from kincompile.runtime.engine.code import SENSITIVE, SENSITIVITIES, code_of
 from kincompile.runtime.engine.dense import powers_of_rows
 from kincompile.runtime.inputs import names_of
@@ -141,11 +140,7 @@ class Sensitivities(Shown):
 
     def _found(self, column: str) -> tuple[str, int]:
         """Return the coordinate or output, and the order of the rate, that a name means."""
-        wanted, known = column_name(column), (*self.coordinates, *self.outputs)
-        if found := rate_of(wanted, known):
-            return found
-        text, remedy = f"{self.name} has no column {column!r}", "; add _dot or _ddot for the rates"
-        raise InputError(unknown(text, wanted, known, remedy))
+        return column_meant(self.name, column, self.coordinates, self.outputs)
 
     def to_text(self) -> str:
         """Return a table: by parameter, the largest absolute derivative of each column."""
@@ -220,7 +215,7 @@ def sensitivities(
     code = code_of(solution.require_module("its sensitivities"))
     columns = (*code.coordinates, *code.outputs)
     if of is not None:
-        columns = _columns(names_of(of, "of"), columns, solution.name)
+        columns = _columns(names_of(of, "of"), code)
     found = _Asked(code, names, columns, second).over(solution)
     found, pairs = found[:, : len(names)], found[:, len(names) :]
     size = len(set(columns) & set(code.coordinates))
@@ -248,16 +243,13 @@ def _symmetric(pairs: Array, count: int) -> Array:
     return found
 
 
-def _columns(of: Sequence[str], known: Sequence[str], mechanism: str) -> tuple[str, ...]:
+def _columns(of: Sequence[str], code: Compiled) -> tuple[str, ...]:
     """Return the names of columns, the coordinates first."""
     if not of:
-        raise InputError(f"no column of {mechanism} is asked for: name one.")
-    wanted = [column_name(name) for name in of]
-    for given, name in zip(of, wanted, strict=True):
-        if name not in known:
-            text = f"{mechanism} has no coordinate or output {given!r}"
-            raise InputError(unknown(text, name, known, "; derivatives of rates come with them"))
-    return tuple(name for name in known if name in wanted)
+        raise InputError(f"no column of {code.name} is asked for: name one.")
+    wanted = code.columns(of, advice="derivatives of rates come with them")
+    known = (*code.coordinates, *code.outputs)
+    return tuple(name for k, name in enumerate(known) if k in wanted)
 
 
 def _are_met(matrix: Array, rates: Array, sides: Array, part: float) -> NDArray[np.bool_]:

@@ -141,5 +141,4 @@ class Balance:
         if self.code.outputs:
             still = np.zeros_like(q)
             rows = np.vstack((rows, self.code.outputs_q(q, still, still, t, self._p)))
-        text = f"{self.code.name} has no coordinate and no output"
-        return np.asarray(rows[self.code.columns(names, text)])
+        return np.asarray(rows[self.code.columns(names)])

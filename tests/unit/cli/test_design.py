@@ -190,7 +190,7 @@ targets = [
         (
             "fit",
             "[fit]\nparameters = { r = [1, 2] }\ntargets = [{ path = 'rm', points = [[1, 2]] }]",
-            "no coordinate, point or output 'x_rm'",
+            "has no column 'x_rm'",
         ),
     ],
 )

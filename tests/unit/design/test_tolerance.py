@@ -180,9 +180,9 @@ def test_all_that_is_wrong_is_said_at_once(slider_crank):
         ({"tolerances": {"L": 0.1}, "clearances": {"motor": 1e-5}}, "no joint 'motor'"),
         ({"tolerances": {}}, "there are no tolerances"),
         ({"tolerances": {"L": 0.1}, "samples": -1}, "samples is -1"),
-        ({"tolerances": {"L": 0.1}, "of": ["speed_dot_dot"]}, "no coordinate, point or output"),
+        ({"tolerances": {"L": 0.1}, "of": ["speed_dot_dot"]}, "has no column"),
         ({"tolerances": {"L": 0.1}, "of": ["speed_ddot"]}, "output 'speed' has no second rate"),
-        ({"tolerances": {"L": 0.1}, "of": ["slidr.x"]}, "no coordinate, point or output 'slidr.x'"),
+        ({"tolerances": {"L": 0.1}, "of": ["slidr.x"]}, "has no column 'slidr.x'"),
     ],
 )
 def test_bad_input_says_what_and_where(slider_crank, arguments, words):

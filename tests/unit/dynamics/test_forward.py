@@ -362,7 +362,7 @@ class TestBadInput:
             ({"position": {"first.phi": math.nan}}, "give a finite number"),
             ({"velocity": {"first.phi_dott": 0}}, "velocity: there is no coordinate"),
             ({"velocity": [1, 2]}, r"velocity has shape \(2,\), expected \(6,\)"),
-            ({"events": {"rod.x": 1}}, "an event is asked for at a value of 'x_rod'"),
+            ({"events": {"rod.x": 1}}, "events: double_pendulum has no column 'rod.x'"),
             ({"stops": {"first.x": [1, "a"]}}, "the event at 'first.x' is 'a': give a finite"),
         ],
     )

@@ -321,7 +321,7 @@ def test_that_parameter_sets_are_differentiated_by_few_columns():
 
 def test_what_is_said_of_columns_that_are_none():
     solution = kc.solve(kc.compile(slider_crank()), TIMES)
-    with pytest.raises(InputError, match=r"no coordinate or output 'rod\.ph'; did you mean"):
+    with pytest.raises(InputError, match=r"has no column 'rod\.ph'; did you mean"):
         kc.sensitivities(solution, "r", of="rod.ph")
     with pytest.raises(InputError, match="derivatives of rates come with them"):
         kc.sensitivities(solution, "r", of=["rod.phi_dot"])
