@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from kincompile.report.mathml import index_text, letter_text
 from kincompile.report.notation import has_prime, split_name
 from kincompile.report.picture import svg_element
+from kincompile.report.svg import element
 
 if TYPE_CHECKING:
     from kincompile.report.picture import Picture, PictureLabel
@@ -38,14 +39,13 @@ def svg_address(picture: Picture) -> str:
 def _label(label: PictureLabel, height: float) -> str:
     letter, index, _ = split_name(label.name)
     prime = "\N{PRIME}" if not label.is_vector or has_prime(letter, index) else ""
-    below = f'<tspan dy="4" font-size="{0.7 * SIZE:g}">{index_text(index)}</tspan>' if index else ""
-    above = f'<tspan dy="{-4 if index else 0}">{prime}</tspan>' if prime else ""
-    if label.name in ("x", "y", "z"):  # of the ground
-        above = ""
     text = letter_text(letter, bold=label.is_vector)
-    return (
-        f'<text x="{label.x:.1f}" y="{height - label.y + SIZE / 3:.1f}" font-size="{SIZE}" '
-        f'font-family="{FONT}" text-anchor="middle" fill="{label.colour}" '
-        f'paint-order="stroke" stroke="#fff" stroke-opacity=".7" stroke-width="3">'
-        f"{text}{below}{above}</text>"
-    )
+    if index:
+        text += element("tspan", index_text(index), dy=4, font_size=f"{0.7 * SIZE:g}")
+    if prime and label.name not in ("x", "y", "z"):  # of the ground
+        text += element("tspan", prime, dy=-4 if index else 0)
+    return element(
+        "text", text, x=f"{label.x:.1f}", y=f"{height - label.y + SIZE / 3:.1f}", font_size=SIZE,
+        font_family=FONT, text_anchor="middle", fill=label.colour, paint_order="stroke",
+        stroke="#fff", stroke_opacity=".7", stroke_width=3,
+    )  # fmt: skip

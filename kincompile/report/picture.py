@@ -8,7 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.report.svg import ROUND, element, outline
+
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -58,26 +62,30 @@ class Picture:
 
 def svg_element(picture: Picture, labels: str = "") -> str:
     """Return a picture as an `svg` element of a page, with labels over it."""
-    width, height = round(picture.width), round(picture.height)
+    width, height, title = round(picture.width), round(picture.height), escape(picture.title)
     paths = "".join(svg_path(item, picture.height) for item in picture.paths)
-    return (
-        f'<svg class="figure" viewBox="0 0 {width} {height}" '
-        f'width="{width}" height="{height}" role="img" aria-label="{escape(picture.title)}" '
-        f'stroke-linecap="round" stroke-linejoin="round"><title>{escape(picture.title)}</title>'
-        f"{paths}{labels}</svg>"
-    )
+    return element(
+        "svg", f"<title>{title}</title>{paths}{labels}", class_="figure",
+        viewBox=f"0 0 {width} {height}", width=width, height=height, role="img", aria_label=title,
+        **ROUND,
+    )  # fmt: skip
 
 
 def svg_path(path: PicturePath, height: float) -> str:
     """Return the element of a path in a picture of a height."""
-    points = "L".join(f"{x:.1f} {height - y:.1f}" for x, y in np.asarray(path.points).tolist())
-    style = f'fill="{path.fill or "none"}"'
-    if path.is_pale:
-        style += f' fill-opacity="{FILL}"'
-    if path.stroke and path.width:
-        style += f' stroke="{path.stroke}" stroke-width="{path.width}"'
-    if path.opacity != 1:
-        style += f' opacity="{path.opacity:.3g}"'
-    if path.dash:
-        style += f' stroke-dasharray="{DASHES[path.dash]}"'
-    return f'<path d="M{points}{"Z" if path.fill else ""}" {style}/>'
+    is_drawn = bool(path.stroke and path.width)
+
+    def pair(point: Iterable[float]) -> str:
+        x, y = point
+        return f"{x:.1f} {height - y:.1f}"
+
+    return element(
+        "path",
+        d=outline(np.asarray(path.points).tolist(), bool(path.fill), pair),
+        fill=path.fill or "none",
+        fill_opacity=FILL if path.is_pale else "",
+        stroke=path.stroke if is_drawn else "",
+        stroke_width=path.width if is_drawn else "",
+        opacity=f"{path.opacity:.3g}" if path.opacity != 1 else "",
+        stroke_dasharray=DASHES[path.dash] if path.dash else "",
+    )

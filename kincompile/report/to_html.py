@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from kincompile.report.figure import as_svg
 from kincompile.report.mathml import MathMLPrinter
 from kincompile.report.renderer import Renderer
+from kincompile.report.svg import element, label
 from kincompile.report.templates import fill, read
 
 if TYPE_CHECKING:
@@ -137,29 +138,37 @@ def _pattern_svg(pattern: Pattern) -> str:
     top = 10 + CHARACTER * max(map(len, pattern.columns), default=0)
     length = CELL * len(pattern.columns)
     width, height = left + length + 4, top + CELL * len(pattern.rows) + 4
-    parts = [
-        f'<svg class="pattern" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
-        f'height="{height:.0f}" role="img" aria-label="Pattern of the Jacobian">'
-    ]
-    parts += [
-        f'<rect class="band{k % 2}" x="{left:.0f}" y="{top + CELL * first:.0f}" '
-        f'width="{length}" height="{CELL * count}"/>'
+    bands = (
+        element(
+            "rect", class_=f"band{k % 2}", x=f"{left:.0f}", y=f"{top + CELL * first:.0f}",
+            width=length, height=CELL * count,
+        )
         for k, (first, count) in enumerate(pattern.bands)
-    ]
-    parts += [
-        f'<text x="{left - 5:.0f}" y="{top + CELL * (k + 0.72):.1f}" text-anchor="end">'
-        f"{escape(name)}</text>"
+    )  # fmt: skip
+    rows = (
+        label(name, x=f"{left - 5:.0f}", y=f"{top + CELL * (k + 0.72):.1f}", text_anchor="end")
         for k, name in enumerate(pattern.rows)
-    ]
-    parts += [
-        f'<text transform="translate({left + CELL * (k + 0.72):.1f} {top - 5:.0f}) rotate(-90)">'
-        f"{escape(name)}</text>"
+    )
+    columns = (
+        label(
+            name, transform=f"translate({left + CELL * (k + 0.72):.1f} {top - 5:.0f}) rotate(-90)"
+        )
         for k, name in enumerate(pattern.columns)
-    ]
-    parts += [
-        f'<a href="#{escape(anchor)}"><rect class="entry" x="{left + CELL * column + 2:.0f}" '
-        f'y="{top + CELL * row + 2:.0f}" width="{CELL - 4}" height="{CELL - 4}"><title>'
-        f"{escape(pattern.rows[row])} by {escape(pattern.columns[column])}</title></rect></a>"
+    )
+    entries = (
+        element("a", _cell(pattern, row, column, left, top), href=f"#{escape(anchor)}")
         for (row, column), anchor in pattern.entries.items()
-    ]
-    return "".join([*parts, "</svg>"])
+    )
+    return element(
+        "svg", "".join((*bands, *rows, *columns, *entries)), class_="pattern",
+        viewBox=f"0 0 {width:.0f} {height:.0f}", width=f"{width:.0f}", height=f"{height:.0f}",
+        role="img", aria_label="Pattern of the Jacobian",
+    )  # fmt: skip
+
+
+def _cell(pattern: Pattern, row: int, column: int, left: float, top: float) -> str:
+    title = f"<title>{escape(pattern.rows[row])} by {escape(pattern.columns[column])}</title>"
+    return element(
+        "rect", title, class_="entry", x=f"{left + CELL * column + 2:.0f}",
+        y=f"{top + CELL * row + 2:.0f}", width=CELL - 4, height=CELL - 4,
+    )  # fmt: skip

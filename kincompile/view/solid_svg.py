@@ -6,12 +6,12 @@ Nothing of it moves rigidly on the picture, so that every frame has its own path
 from __future__ import annotations
 
 from dataclasses import replace
-from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.report.picture import svg_path
+from kincompile.report.svg import element, label
 from kincompile.view.picture import Scale
 from kincompile.view.shapes import INKS
 from kincompile.view.solid_picture import Camera, seen_paths, trace
@@ -53,7 +53,7 @@ def svg_in_space(
         for frame, row in zip(frames, shown, strict=True)
     ]
     moving = "".join(_frames(pictures, timing)) if timing and len(pictures) > 1 else ""
-    size, paper = (scale.width, scale.height), f' fill="{INKS["paper"]}"'
+    size, paper = (scale.width, scale.height), {"fill": INKS["paper"]}
     true_size = None if millimetres is None else millimetres / scale.factor
     heading = drawn.name, description
     return document(heading, size, NAME, paper, (pictures[0], moving), true_size=true_size)
@@ -62,11 +62,17 @@ def svg_in_space(
 def _frames(pictures: Sequence[str], timing: Timing) -> list[str]:
     """Return groups of which one is shown at a time."""
     ends = [*timing.parts[1:].tolist(), 1.0]
+    clock = {"dur": f"{timing.seconds:g}s", "repeatCount": "indefinite"}
+    changes = (
+        element(
+            "animate", attributeName="display", calcMode="discrete", values="none;inline;none",
+            keyTimes=f"0;{start:.4g};{end:.4g}", **clock,
+        )
+        for start, end in zip(timing.parts.tolist(), ends, strict=True)
+    )  # fmt: skip
     return [
-        f'<g display="none"><animate attributeName="display" calcMode="discrete" '
-        f'values="none;inline;none" keyTimes="0;{start:.4g};{end:.4g}" dur="{timing.seconds:g}s" '
-        f'repeatCount="indefinite"/>{picture}</g>\n'
-        for picture, start, end in zip(pictures, timing.parts.tolist(), ends, strict=True)
+        element("g", f"{change}{picture}", display="none") + "\n"
+        for change, picture in zip(changes, pictures, strict=True)
     ]
 
 
@@ -75,8 +81,8 @@ def _name(name: str, seen: Array, scale: Scale) -> str:
     place = scale.at(np.asarray(seen)[:2])
     is_right = place[0] + NAME * len(name) < scale.width
     x, y = place[0] + (NAME / 2 if is_right else -NAME / 2), scale.height - place[1] - NAME / 2
-    anchor = "" if is_right else ' text-anchor="end"'
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}"{anchor} fill="{INKS["ink"]}" stroke="{INKS["paper"]}" '
-        f'stroke-width="3" paint-order="stroke">{escape(name)}</text>\n'
-    )
+    written = label(
+        name, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor="" if is_right else "end", fill=INKS["ink"],
+        stroke=INKS["paper"], stroke_width=3, paint_order="stroke",
+    )  # fmt: skip
+    return f"{written}\n"

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.report.picture import DASHES, FILL
+from kincompile.report.svg import ROUND, element, label, outline
 from kincompile.report.templates import read
 from kincompile.view.marks import GROUND_FRAME, moves_with
 from kincompile.view.polylines import Polyline, polylines
@@ -56,12 +57,11 @@ class Timing:
     parts: Array  # shape (F,): the part of it at which each frame is shown, from 0 to 1
 
     @property
-    def attributes(self) -> str:
+    def attributes(self) -> dict[str, str]:
         """The attributes of an animation."""
         uneven = np.abs(self.parts - np.linspace(0, 1, self.parts.size)).max() > 1e-6
-        shown = ";".join(f"{part:.5g}" for part in self.parts)
-        times = f' keyTimes="{shown}"' if uneven else ""
-        return f'dur="{self.seconds:g}s" repeatCount="indefinite"{times}'
+        times = ";".join(f"{part:.5g}" for part in self.parts) if uneven else ""
+        return {"dur": f"{self.seconds:g}s", "repeatCount": "indefinite", "keyTimes": times}
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class _Motion:
         turned = "" if self.turn is None else f" rotate({_number(self.turn[0])})"
         return f"translate({_pair(self.shift[0])}){turned}"
 
-    def animation(self, clock: str) -> str:
+    def animation(self, clock: Mapping[str, str]) -> str:
         """Return the elements that move a group by a clock; without one, nothing."""
         if not clock:
             return ""
@@ -142,7 +142,7 @@ def as_svg(
     unit = sheet.scale * drawn.size
     line = max(1.0, unit / THICK)
     traces = "".join(_trace(k, sheet.at(path), line) for k, path in enumerate(paths))
-    parts = traces.join(_layers(drawn, q[:1], sheet, line, ""))
+    parts = traces.join(_layers(drawn, q[:1], sheet, line, {}))
     moving = ""
     if timing is not None and len(q) > 1:
         moving = traces.join(_layers(drawn, q, sheet, line, timing.attributes))
@@ -157,7 +157,7 @@ def document(
     heading: tuple[str, str],
     size: tuple[float, float],
     font: float,
-    paper: str,
+    paper: Mapping[str, str],
     parts: tuple[str, str],
     style: str = "",
     true_size: float | None = None,
@@ -169,24 +169,29 @@ def document(
     """
     shown, moving = parts
     if moving:
-        shown = f'<g class="still" display="none">{shown}</g>\n<g class="moving">{moving}</g>'
+        still = element("g", shown, class_="still", display="none")
+        shown = f"{still}\n{element('g', moving, class_='moving')}"
         style += STILL
     wide, tall = map(_number, size)
     if true_size is not None:
         wide, tall = (f"{side * true_size:.7g}mm" for side in size)
-    rules = f"<style>{style}</style>\n" if style else ""
+    rules = f"{element('style', style)}\n" if style else ""
     title, description = map(escape, heading)
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_pair(size)}" width="{wide}" '
-        f'height="{tall}" role="img" aria-labelledby="title description" '
-        f'stroke-linecap="round" stroke-linejoin="round" '
-        f'font-family="system-ui,sans-serif" font-size="{_number(font)}">\n'
-        f'<title id="title">{title}</title>\n<desc id="description">{description}</desc>\n'
-        f'{rules}<rect width="100%" height="100%"{paper}/>\n{shown}\n</svg>\n'
+    inside = (
+        f'\n<title id="title">{title}</title>\n<desc id="description">{description}</desc>\n'
+        f"{rules}{element('rect', width='100%', height='100%', **paper)}\n{shown}\n"
     )
+    whole = element(
+        "svg", inside, xmlns="http://www.w3.org/2000/svg", viewBox=f"0 0 {_pair(size)}",
+        width=wide, height=tall, role="img", aria_labelledby="title description", **ROUND,
+        font_family="system-ui,sans-serif", font_size=_number(font),
+    )  # fmt: skip
+    return f"{whole}\n"
 
 
-def _layers(drawn: Drawing, q: Array, sheet: _Sheet, line: float, clock: str) -> tuple[str, str]:
+def _layers(
+    drawn: Drawing, q: Array, sheet: _Sheet, line: float, clock: Mapping[str, str]
+) -> tuple[str, str]:
     """Return what is below the paths, and above them: the named points with their names."""
     strokes = _shown(drawn, q)
     below = [_stroke(item, q, sheet, line, clock) for item in strokes if item.stroke.look != DOT]
@@ -197,18 +202,18 @@ def _layers(drawn: Drawing, q: Array, sheet: _Sheet, line: float, clock: str) ->
     return _together(below, clock), _together(above, clock)
 
 
-def _together(strokes: Iterable[tuple[_Motion | None, str]], clock: str) -> str:
+def _together(strokes: Iterable[tuple[_Motion | None, str]], clock: Mapping[str, str]) -> str:
     """Return elements; neighbours that move together are one group."""
     found = []
-    for group, items in itertools.groupby(strokes, lambda item: _group(item[0], clock)):
+    for (start, moves), items in itertools.groupby(strokes, lambda item: _group(item[0], clock)):
         text = "".join(text for _, text in items)
-        found.append(f"<g{group}{text}</g>\n" if group else text)
+        found.append(f"{element('g', moves + text, transform=start)}\n" if start else text)
     return "".join(found)
 
 
-def _group(motion: _Motion | None, clock: str) -> str:
-    """Return the attributes of a group, and the elements that move it."""
-    return f' transform="{motion.start}">{motion.animation(clock)}' if motion else ""
+def _group(motion: _Motion | None, clock: Mapping[str, str]) -> tuple[str, str]:
+    """Return the transform of a group, and the elements that move it."""
+    return (motion.start, motion.animation(clock)) if motion else ("", "")
 
 
 def _shown(drawn: Drawing, q: Array) -> list[Polyline]:
@@ -221,15 +226,15 @@ def _shown(drawn: Drawing, q: Array) -> list[Polyline]:
 
 
 def _stroke(
-    item: Polyline, q: Array, sheet: _Sheet, line: float, clock: str
+    item: Polyline, q: Array, sheet: _Sheet, line: float, clock: Mapping[str, str]
 ) -> tuple[_Motion | None, str]:
     points = [item.at(row) for row in q]
     moved = _rigid(item, points, q, sheet)
     if moved is not None:
         motion, own = moved
-        return motion, _path(_outline(own, item.is_area), item, line)
-    shapes = [_outline(sheet.at(shape), item.is_area) for shape in points]
-    values = f'<animate attributeName="d" values="{";".join(shapes)}" {clock}/>'
+        return motion, _path(outline(own, item.is_area, _pair), item, line)
+    shapes = [outline(sheet.at(shape), item.is_area, _pair) for shape in points]
+    values = element("animate", attributeName="d", values=";".join(shapes), **clock)
     return None, _path(shapes[0], item, line, values)
 
 
@@ -262,50 +267,39 @@ def _rigid(
 def _path(shape: str, item: Polyline, line: float, inside: str = "") -> str:
     look = item.look
     hue = "quiet" if item.frame == GROUND_FRAME else f"body{item.frame.index % len(HUES['light'])}"
-    stroke = look.line or hue
     fill = (look.face or f"pale-{hue}") if item.is_area else ""
-    width = f' stroke-width="{_number(line * look.width)}"' if look.width else ""
-    dash = _dash(look.dash, line)
-    content = f">{inside}</path>" if inside else "/>"
-    return f'<path d="{shape}"{_paint(stroke if look.width else "", fill)}{width}{dash}{content}\n'
+    lengths = (_number(line * float(part)) for part in DASHES.get(look.dash, "").split())
+    drawn = element(
+        "path",
+        inside,
+        d=shape,
+        **_paint((look.line or hue) if look.width else "", fill),
+        stroke_width=_number(line * look.width) if look.width else "",
+        stroke_dasharray=" ".join(lengths),
+    )
+    return f"{drawn}\n"
 
 
 def _trace(index: int, points: Array, line: float) -> str:
     """Return the elements of a path: in a colour of its own, on a rim of paper."""
-    shape, hue = _outline(points, False), f"body{(index + 4) % len(HUES['light'])}"
+    shape, hue = outline(points, False, _pair), f"body{(index + 4) % len(HUES['light'])}"
+    widths = (("paper", 3), (hue, 1.5))
     return "".join(
-        f'<path d="{shape}"{_paint(colour, "")} stroke-width="{_number(width * line)}"/>\n'
-        for colour, width in (("paper", 3), (hue, 1.5))
+        element("path", d=shape, **_paint(colour, ""), stroke_width=_number(width * line)) + "\n"
+        for colour, width in widths
     )
 
 
 def _name(name: str, place: Array, line: float) -> str:
     """Return the element of a name, beside its point, on a rim of paper."""
     x, y = place[0] + 6 * line, place[1] - 6 * line
-    return (
-        f'<text x="{_number(x)}" y="{_number(y)}"{_paint("paper", "ink")} '
-        f'stroke-width="{_number(2 * line)}" paint-order="stroke">{escape(name)}</text>\n'
-    )
+    paint = _paint("paper", "ink") | {"stroke_width": _number(2 * line), "paint_order": "stroke"}
+    return label(name, x=_number(x), y=_number(y), **paint) + "\n"
 
 
-def _transform(kind: str, additive: str, values: Iterable[str], clock: str) -> str:
-    return (
-        f'<animateTransform attributeName="transform" type="{kind}" additive="{additive}" '
-        f'values="{";".join(values)}" {clock}/>'
-    )
-
-
-def _outline(points: Array, is_closed: bool) -> str:
-    """Return the data of a path; NaN interrupts it."""
-    pieces: list[str] = []
-    is_down = False
-    for point in points:
-        if np.isnan(point).any():
-            is_down = False
-            continue
-        pieces.append(f"{'L' if is_down else 'M'}{_pair(point)}")
-        is_down = True
-    return "".join(pieces) + ("Z" if is_closed else "")
+def _transform(kind: str, additive: str, values: Iterable[str], clock: Mapping[str, str]) -> str:
+    changed = {"attributeName": "transform", "type": kind, "additive": additive}
+    return element("animateTransform", **changed, values=";".join(values), **clock)
 
 
 def _pair(point: Iterable[float]) -> str:
@@ -319,20 +313,14 @@ def _number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
-def _dash(dash: str, line: float) -> str:
-    lengths = " ".join(_number(line * float(part)) for part in DASHES.get(dash, "").split())
-    return f' stroke-dasharray="{lengths}"' if lengths else ""
-
-
 # ---- colours ----
 
 
-def _paint(stroke: str, fill: str) -> str:
+def _paint(stroke: str, fill: str) -> dict[str, str]:
     """Return the attributes of colours by name: those on light paper, and classes for dark."""
-    light = _palettes()["light"]
+    light = {**_palettes()["light"], "": ""}
     names = [f"{kind}-{name}" for kind, name in (("s", stroke), ("f", fill)) if name]
-    stroked = f' stroke="{light[stroke]}"' if stroke else ""
-    return f'{stroked} fill="{light[fill] if fill else "none"}" class="{" ".join(names)}"'
+    return {"stroke": light[stroke], "fill": light[fill] or "none", "class_": " ".join(names)}
 
 
 def _dark_rules() -> str:
