@@ -7,34 +7,8 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from kincompile.derivations.evaluation import anchor, is_number
-from kincompile.report.document import (
-    Chapter,
-    CrossReference,
-    Display,
-    Figure,
-    Math,
-    NotebookCode,
-    Pattern,
-    Verbatim,
-    row_range,
-    table,
-    text,
-)
-from kincompile.report.formulas import (
-    DELTA_Q,
-    GAMMA,
-    NU,
-    PHI,
-    PHI_Q,
-    Q_DDOT,
-    Q_DOT,
-    Decimal,
-    Equated,
-    Glyph,
-    Joined,
-    Q,
-    decimals,
-)
+from kincompile.report import document as doc
+from kincompile.report import formulas as fm
 from kincompile.structure.report import gruebler
 from kincompile.tables import counted
 
@@ -45,10 +19,9 @@ if TYPE_CHECKING:
     from kincompile.derivations.figures import Figures
     from kincompile.ir.inline import Entry
     from kincompile.model.bodies import Body
-    from kincompile.report.document import Block, Run, Runs
     from kincompile.runtime.newton import NewtonResult
 
-    Rows: TypeAlias = list[tuple[Run | Runs, ...]]
+    Rows: TypeAlias = list[tuple[doc.Run | doc.Runs, ...]]
 
 LARGEST_MATRIX = 9
 """Columns up to which a matrix of numbers is written out."""
@@ -62,7 +35,7 @@ MOST_COORDINATES = 12
 ITERATE_DIGITS = 10
 
 
-def assembled_section(evaluation: Evaluation) -> Chapter:
+def assembled_section(evaluation: Evaluation) -> doc.Chapter:
     """Return the part of the page on the whole system."""
     parts = (
         _offsets(evaluation),
@@ -73,15 +46,15 @@ def assembled_section(evaluation: Evaluation) -> Chapter:
         _newton(evaluation),
         _rates(evaluation),
     )
-    return Chapter("assembled", ("The assembled system",), (), parts)
+    return doc.Chapter("assembled", ("The assembled system",), (), parts)
 
 
-EULER_PARAMETERS: Runs = (
+EULER_PARAMETERS: doc.Runs = (
     "A body has the Euler parameters p = (e0, e), of length one. Its rotation matrix is ",
-    Verbatim("A = E G^T = (e0^2 - e^T e) I + 2 e e^T + 2 e0 e~"),
+    doc.Verbatim("A = E G^T = (e0^2 - e^T e) I + 2 e e^T + 2 e0 e~"),
     ", where e~ is the skew matrix of e, E = [-e, e~ + e0 I] and G = [-e, -e~ + e0 I]. "
     "The derivative of A s by p is the matrix ",
-    Verbatim("B(p, s) = 2 [(e0 I + e~) s, e s^T - (e0 I + e~) s~]"),
+    doc.Verbatim("B(p, s) = 2 [(e0 I + e~) s, e s^T - (e0 I + e~) s~]"),
     ", linear in p and in s. The angular velocity is 2 E p_dot in the global frame, 2 G p_dot in "
     "that of the body.",
 )
@@ -102,34 +75,36 @@ IDENTITIES = (
 """Identities where p^T p = 1 and p^T p_dot = 0, factors with a space between them."""
 
 
-def unknowns_section(figures: Figures) -> Chapter:
+def unknowns_section(figures: Figures) -> doc.Chapter:
     """Return the mechanism drawn, its coordinates and parameters, with the chosen state."""
     evaluation = figures.evaluation
     values, q = evaluation.values, evaluation.shown["q"]
     rows: Rows = [
-        (str(k), Verbatim(item.name), item.unit, _math(item.guess), _math(q[k]))
+        (str(k), doc.Verbatim(item.name), item.unit, _math(item.guess), _math(q[k]))
         for k, item in enumerate(evaluation.system.coordinates)
     ]
-    blocks: list[Block] = []
+    blocks: list[doc.Block] = []
     if (shown := figures.mechanism()) is not None:
-        blocks.append(Figure(shown))
-    blocks.append(table(("column", "coordinate", "unit", "guess", "chosen state"), rows))
+        blocks.append(doc.Figure(shown))
+    blocks.append(doc.table(("column", "coordinate", "unit", "guess", "chosen state"), rows))
     if len(evaluation.system.ground.kind.axes) > 2:
-        blocks.append(text(*EULER_PARAMETERS))
+        blocks.append(doc.text(*EULER_PARAMETERS))
         rows_of_three = [IDENTITIES[k : k + 3] for k in range(0, len(IDENTITIES), 3)]
-        lines = [tuple(Verbatim(item) for item in row) for row in rows_of_three]
-        blocks.append(table(("", "", ""), lines, "Identities, where p^T p = 1 and p^T p_dot = 0"))
+        lines = [tuple(doc.Verbatim(item) for item in row) for row in rows_of_three]
+        blocks.append(
+            doc.table(("", "", ""), lines, "Identities, where p^T p = 1 and p^T p_dot = 0")
+        )
     if evaluation.system.parameters:
         known: Rows = [
-            (Verbatim(item.name), item.unit, _math(values[item.name]))
+            (doc.Verbatim(item.name), item.unit, _math(values[item.name]))
             for item in evaluation.system.parameters
         ]
-        blocks.append(table(("parameter", "unit", "value"), known))
-    return Chapter("unknowns", ("Coordinates and parameters",), tuple(blocks))
+        blocks.append(doc.table(("parameter", "unit", "value"), known))
+    return doc.Chapter("unknowns", ("Coordinates and parameters",), tuple(blocks))
 
 
-def _math(value: float, digits: int = 6) -> Math:
-    return Math(Decimal(value, digits))
+def _math(value: float, digits: int = 6) -> doc.Math:
+    return doc.Math(fm.Decimal(value, digits))
 
 
 def _column_rule(bodies: Sequence[Body]) -> str:
@@ -142,31 +117,31 @@ def _column_rule(bodies: Sequence[Body]) -> str:
     return f"The column offset of a body is {times}the number of bodies before it."
 
 
-def _offsets(evaluation: Evaluation) -> Chapter:
+def _offsets(evaluation: Evaluation) -> doc.Chapter:
     system = evaluation.system
     rows: Rows = []
     for item, first in zip(
         evaluation.system.constraints, evaluation.system.row_offsets, strict=True
     ):
         count = len(item.equation_names)
-        name = CrossReference(f"constraint-{item.name}", Verbatim(item.name))
-        rows.append((name, str(count), str(first), row_range(first, count), str(first + 1)))
-    note = text(
+        name = doc.CrossReference(f"constraint-{item.name}", doc.Verbatim(item.name))
+        rows.append((name, str(count), str(first), doc.row_range(first, count), str(first + 1)))
+    note = doc.text(
         "The row offset of a constraint is the number of equations before it. "
         f"{_column_rule(system.bodies)}"
     )
     header = ("constraint", "equations", "row offset", "rows from 0", "first row from 1")
     columns: Rows = [
-        (Verbatim(body.name), str(own[0]), row_range(own[0], len(own)))
+        (doc.Verbatim(body.name), str(own[0]), doc.row_range(own[0], len(own)))
         for body, own in zip(system.bodies, system.body_columns, strict=True)
     ]
-    blocks: list[Block] = [note, table(header, rows)]
+    blocks: list[doc.Block] = [note, doc.table(header, rows)]
     if columns:
-        blocks.append(table(("body", "column offset", "columns from 0"), columns))
-    return Chapter("offsets", ("Row and column offsets",), tuple(blocks), (), "expanded")
+        blocks.append(doc.table(("body", "column offset", "columns from 0"), columns))
+    return doc.Chapter("offsets", ("Row and column offsets",), tuple(blocks), (), "expanded")
 
 
-def _pattern(evaluation: Evaluation) -> Chapter:
+def _pattern(evaluation: Evaluation) -> doc.Chapter:
     entries = {
         (entry.row, entry.column): anchor("Phi_q", entry)
         for section in evaluation.code.constraints
@@ -175,16 +150,18 @@ def _pattern(evaluation: Evaluation) -> Chapter:
     counts = (len(item.equation_names) for item in evaluation.system.constraints)
     bands = tuple(zip(evaluation.system.row_offsets, counts, strict=True))
     m, n = len(evaluation.system.equations), len(evaluation.coordinates)
-    note = text(
-        f"{len(entries)} of the {m} \N{MULTIPLICATION SIGN} {n} entries of ", Math(PHI_Q),
+    note = doc.text(
+        f"{len(entries)} of the {m} \N{MULTIPLICATION SIGN} {n} entries of ", doc.Math(fm.PHI_Q),
         " can differ from zero.",
     )  # fmt: skip
-    picture = Pattern(evaluation.system.equations, tuple(evaluation.coordinates), entries, bands)
+    picture = doc.Pattern(
+        evaluation.system.equations, tuple(evaluation.coordinates), entries, bands
+    )
     title = ("The pattern of the Jacobian",)
-    return Chapter("pattern", title, (note, picture), (), "expanded")
+    return doc.Chapter("pattern", title, (note, picture), (), "expanded")
 
 
-def _mobility(evaluation: Evaluation) -> Chapter:
+def _mobility(evaluation: Evaluation) -> doc.Chapter:
     mobility = gruebler(evaluation.system)
     of_bodies = mobility.coordinates - mobility.others
     rows: Rows = [
@@ -195,34 +172,38 @@ def _mobility(evaluation: Evaluation) -> Chapter:
         ("equations of drivers", "", f"\N{MINUS SIGN}{mobility.driver_equations}"),
         ("not driven", "", str(mobility.undriven)),
     ]  # fmt: skip
-    blocks: list[Block] = [table(("what", "count", "number"), rows)]
+    blocks: list[doc.Block] = [doc.table(("what", "count", "number"), rows)]
     if evaluation.problem:
-        blocks.append(text(evaluation.problem))
-    return Chapter("mobility", ("Mobility",), tuple(blocks))
+        blocks.append(doc.text(evaluation.problem))
+    return doc.Chapter("mobility", ("Mobility",), tuple(blocks))
 
 
-def _vectors(evaluation: Evaluation) -> Chapter:
+def _vectors(evaluation: Evaluation) -> doc.Chapter:
     rows: Rows = []
     for section in evaluation.code.constraints:
         quantities = (section.entries[name] for name in ("Phi", "nu", "gamma"))
         for Phi, nu, gamma in zip(*quantities, strict=True):
-            row: list[Run | Runs] = [str(Phi.row), Verbatim(evaluation.system.equations[Phi.row])]
+            row: list[doc.Run | doc.Runs] = [
+                str(Phi.row),
+                doc.Verbatim(evaluation.system.equations[Phi.row]),
+            ]
             for quantity, entry in (("Phi", Phi), ("nu", nu), ("gamma", gamma)):
                 shown = evaluation.brief(quantity, entry)
                 row += [
-                    CrossReference(anchor(quantity, entry), shown),
+                    doc.CrossReference(anchor(quantity, entry), shown),
                     _math(evaluation.value(quantity, entry)),
                 ]
             rows.append(tuple(row))
-    header: tuple[Run, ...] = (
-        "row", "equation", Math(PHI), "number", Math(NU), "number", Math(GAMMA), "number",
+    header: tuple[doc.Run, ...] = (
+        "row", "equation", doc.Math(fm.PHI), "number", doc.Math(fm.NU), "number",
+        doc.Math(fm.GAMMA), "number",
     )  # fmt: skip
-    title = ("The arrays ", Math(PHI), ", ", Math(NU), " and ", Math(GAMMA))
-    note = text(f"Numbers at {evaluation.origin}. Each formula leads to its derivation.")
-    return Chapter("arrays", title, (note, table(header, rows)), (), "expanded")
+    title = ("The arrays ", doc.Math(fm.PHI), ", ", doc.Math(fm.NU), " and ", doc.Math(fm.GAMMA))
+    note = doc.text(f"Numbers at {evaluation.origin}. Each formula leads to its derivation.")
+    return doc.Chapter("arrays", title, (note, doc.table(header, rows)), (), "expanded")
 
 
-def _jacobian(evaluation: Evaluation) -> Chapter:
+def _jacobian(evaluation: Evaluation) -> doc.Chapter:
     found = {
         (entry.row, entry.column): entry
         for section in evaluation.code.constraints
@@ -230,133 +211,150 @@ def _jacobian(evaluation: Evaluation) -> Chapter:
     }
     is_wide = len(evaluation.coordinates) > WIDEST_TABLE
     entries = _listed_entries(evaluation, found) if is_wide else _square_entries(evaluation, found)
-    note = text(
+    note = doc.text(
         "Each entry leads to its derivation, where its line in the emitted module stands. ",
         f"Numbers at {evaluation.origin}.",
     )
-    check = NotebookCode("print(np.round(Phi_q(q, t, p), 6))")
-    title = ("The Jacobian ", Math(PHI_Q))
-    return Chapter("jacobian", title, (note, entries, check), (), "expanded")
+    check = doc.NotebookCode("print(np.round(Phi_q(q, t, p), 6))")
+    title = ("The Jacobian ", doc.Math(fm.PHI_Q))
+    return doc.Chapter("jacobian", title, (note, entries, check), (), "expanded")
 
 
-def _square_entries(evaluation: Evaluation, found: Mapping[tuple[int, int], Entry]) -> Block:
+def _square_entries(evaluation: Evaluation, found: Mapping[tuple[int, int], Entry]) -> doc.Block:
     rows: Rows = []
     for row, name in enumerate(evaluation.system.equations):
-        line: list[Run | Runs] = [Verbatim(name)]
+        line: list[doc.Run | doc.Runs] = [doc.Verbatim(name)]
         for column in range(len(evaluation.coordinates)):
             entry = found.get((row, column))
             line.append("" if entry is None else _cell(evaluation, entry))
         rows.append(tuple(line))
-    return table(("", *(Verbatim(name) for name in evaluation.coordinates)), rows)
+    return doc.table(("", *(doc.Verbatim(name) for name in evaluation.coordinates)), rows)
 
 
-def _listed_entries(evaluation: Evaluation, found: Mapping[tuple[int, int], Entry]) -> Block:
+def _listed_entries(evaluation: Evaluation, found: Mapping[tuple[int, int], Entry]) -> doc.Block:
     rows: Rows = [
         (
-            Verbatim(evaluation.system.equations[row]),
-            Verbatim(evaluation.coordinates[column]),
+            doc.Verbatim(evaluation.system.equations[row]),
+            doc.Verbatim(evaluation.coordinates[column]),
             _cell(evaluation, entry),
         )
         for (row, column), entry in found.items()
     ]
-    return table(("row", "column", "entry"), rows)
+    return doc.table(("row", "column", "entry"), rows)
 
 
-def _cell(evaluation: Evaluation, entry: Entry) -> Runs:
+def _cell(evaluation: Evaluation, entry: Entry) -> doc.Runs:
     shown, number = evaluation.brief("Phi_q", entry), _math(evaluation.value("Phi_q", entry))
     if is_number(evaluation.expanded(entry)):
-        return (CrossReference(anchor("Phi_q", entry), shown),)
-    return (CrossReference(anchor("Phi_q", entry), shown), " = ", number)
+        return (doc.CrossReference(anchor("Phi_q", entry), shown),)
+    return (doc.CrossReference(anchor("Phi_q", entry), shown), " = ", number)
 
 
-def _newton(evaluation: Evaluation) -> Chapter:
-    blocks: list[Block] = [
-        text(
+def _newton(evaluation: Evaluation) -> doc.Chapter:
+    blocks: list[doc.Block] = [
+        doc.text(
             f"{evaluation.start or 'From the guess'}, each step solves ",
-            Math(Equated((Joined((PHI_Q, DELTA_Q)), Joined(("-", PHI))))),
+            doc.Math(fm.Equated((fm.Joined((fm.PHI_Q, fm.DELTA_Q)), fm.Joined(("-", fm.PHI))))),
             " and adds the correction. It stops when the correction is small; that correction has "
             "been applied.",
         )
     ]
     result = evaluation.assembly
     if result is None:
-        blocks.append(text(evaluation.problem))
+        blocks.append(doc.text(evaluation.problem))
     else:
         blocks += _iterations(evaluation, result)
         blocks += _first_step(evaluation, result)
-    return Chapter("newton", ("Position: Newton's method",), tuple(blocks), (), "numeric")
+    return doc.Chapter("newton", ("Position: Newton's method",), tuple(blocks), (), "numeric")
 
 
-def _iterations(evaluation: Evaluation, result: NewtonResult) -> Iterator[Block]:
+def _iterations(evaluation: Evaluation, result: NewtonResult) -> Iterator[doc.Block]:
     names = evaluation.coordinates if len(evaluation.coordinates) <= MOST_COORDINATES else []
     rows: Rows = []
     for k, (q, residual) in enumerate(zip(result.iterates, result.residuals, strict=True)):
         correction = _math(result.corrections[k], 7) if k < len(result.corrections) else ""
         numbers = (_math(value, ITERATE_DIGITS) for value in q[: len(names)])
         rows.append((str(k), *numbers, _math(residual, 7), correction))
-    norms = (Math(Joined(("|", PHI, "|"))), Math(Joined(("|", DELTA_Q, "|"))))
-    yield table(("step", *(Verbatim(name) for name in names), *norms), rows)
+    norms = (doc.Math(fm.Joined(("|", fm.PHI, "|"))), doc.Math(fm.Joined(("|", fm.DELTA_Q, "|"))))
+    yield doc.table(("step", *(doc.Verbatim(name) for name in names), *norms), rows)
     outcome = result.status.name.lower().replace("_", " ")
-    yield text(f"{counted(result.iterations, 'correction')}; the outcome: {outcome}.")
+    yield doc.text(f"{counted(result.iterations, 'correction')}; the outcome: {outcome}.")
 
 
-def _first_step(evaluation: Evaluation, result: NewtonResult) -> Iterator[Block]:
+def _first_step(evaluation: Evaluation, result: NewtonResult) -> Iterator[doc.Block]:
     if result.iterations == 0:
         return
     guess = result.iterates[0] + 0.0
     Phi, Phi_q = evaluation.module.position(guess, evaluation.t, evaluation.p)
     correction = result.iterates[1] - guess
-    yield text("The first step in numbers:")
+    yield doc.text("The first step in numbers:")
     if guess.size <= LARGEST_MATRIX:
-        product = Joined((decimals(Phi_q, 4), decimals(correction)))
-        yield Display(Equated((Joined((PHI_Q, DELTA_Q)), product, decimals(-Phi))))
+        product = fm.Joined((fm.decimals(Phi_q, 4), fm.decimals(correction)))
+        yield doc.Display(
+            fm.Equated((fm.Joined((fm.PHI_Q, fm.DELTA_Q)), product, fm.decimals(-Phi)))
+        )
     columns = zip(evaluation.coordinates, guess, correction, result.iterates[1], strict=True)
     rows: Rows = [
-        (Verbatim(name), *(_math(value, ITERATE_DIGITS) for value in values))
+        (doc.Verbatim(name), *(_math(value, ITERATE_DIGITS) for value in values))
         for name, *values in columns
     ]
-    yield table(("coordinate", "before", Math(DELTA_Q), "after the step"), rows)
-    yield NotebookCode(
+    yield doc.table(("coordinate", "before", doc.Math(fm.DELTA_Q), "after the step"), rows)
+    yield doc.NotebookCode(
         f"start = np.array({guess.tolist()})\n"
         "correction = np.linalg.solve(Phi_q(start, t, p), -Phi(start, t, p))\n"
         "print(np.round(correction, 6))"
     )
 
 
-def _rates(evaluation: Evaluation) -> Chapter:
+def _rates(evaluation: Evaluation) -> doc.Chapter:
     shown = evaluation.shown
     title = ("Velocity and acceleration",)
     if not evaluation.is_assembled:
-        note = text(f"Not solved: the numbers on this page are those of {evaluation.origin}.")
-        return Chapter("rates", title, (note,), (), "numeric")
-    velocity = Equated((Joined((PHI_Q, Q_DOT)), NU))
-    acceleration = Equated((Joined((PHI_Q, Q_DDOT)), GAMMA))
+        note = doc.text(f"Not solved: the numbers on this page are those of {evaluation.origin}.")
+        return doc.Chapter("rates", title, (note,), (), "numeric")
+    velocity = fm.Equated((fm.Joined((fm.PHI_Q, fm.Q_DOT)), fm.NU))
+    acceleration = fm.Equated((fm.Joined((fm.PHI_Q, fm.Q_DDOT)), fm.GAMMA))
     determinant = float(np.linalg.det(evaluation.Phi_q))
     rows: Rows = [
-        (Verbatim(name), *(_math(value, ITERATE_DIGITS) for value in values))
+        (doc.Verbatim(name), *(_math(value, ITERATE_DIGITS) for value in values))
         for name, *values in zip(
             evaluation.coordinates, shown["q"], shown["q_dot"], shown["q_ddot"], strict=True
         )
     ]
-    blocks: list[Block] = [
-        text("With ", Math(PHI_Q), f" at {evaluation.origin}, two linear solves give the rates:"),
-        Display(velocity),
-        Display(acceleration),
+    blocks: list[doc.Block] = [
+        doc.text(
+            "With ",
+            doc.Math(fm.PHI_Q),
+            f" at {evaluation.origin}, two linear solves give the rates:",
+        ),
+        doc.Display(velocity),
+        doc.Display(acceleration),
     ]
     if evaluation.q.size <= LARGEST_MATRIX:
         blocks += [
-            Display(Equated((Joined((decimals(shown["Phi_q"], 4), Q_DOT)), decimals(shown["nu"])))),
-            Display(Equated((Q_DOT, decimals(shown["q_dot"])))),
-            Display(Equated((Joined((PHI_Q, Q_DDOT)), decimals(shown["gamma"])))),
-            Display(Equated((Q_DDOT, decimals(shown["q_ddot"])))),
+            doc.Display(
+                fm.Equated(
+                    (
+                        fm.Joined((fm.decimals(shown["Phi_q"], 4), fm.Q_DOT)),
+                        fm.decimals(shown["nu"]),
+                    )
+                )
+            ),
+            doc.Display(fm.Equated((fm.Q_DOT, fm.decimals(shown["q_dot"])))),
+            doc.Display(
+                fm.Equated((fm.Joined((fm.PHI_Q, fm.Q_DDOT)), fm.decimals(shown["gamma"])))
+            ),
+            doc.Display(fm.Equated((fm.Q_DDOT, fm.decimals(shown["q_ddot"])))),
         ]
-    det = Joined((Glyph("det", bold=False), PHI_Q))
-    blocks.append(Display(Equated((det, Decimal(determinant, ITERATE_DIGITS)))))
-    blocks.append(table(("coordinate", Math(Q), Math(Q_DOT), Math(Q_DDOT)), rows))
+    det = fm.Joined((fm.Glyph("det", bold=False), fm.PHI_Q))
+    blocks.append(doc.Display(fm.Equated((det, fm.Decimal(determinant, ITERATE_DIGITS)))))
     blocks.append(
-        NotebookCode(
+        doc.table(("coordinate", doc.Math(fm.Q), doc.Math(fm.Q_DOT), doc.Math(fm.Q_DDOT)), rows)
+    )
+    blocks.append(
+        doc.NotebookCode(
             "print(np.linalg.solve(Phi_q(q, t, p), nu(q, t, p)))\n"
             "print(np.linalg.solve(Phi_q(q, t, p), gamma(q, q_dot, t, p)))"
         )
     )
-    return Chapter("rates", title, tuple(blocks), (), "numeric")
+    return doc.Chapter("rates", title, tuple(blocks), (), "numeric")

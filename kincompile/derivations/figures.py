@@ -9,14 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.linalg import norm
 
+from kincompile.calculus import expressions as ex
 from kincompile.calculus.expand import Expansion
-from kincompile.calculus.expressions import (
-    VectorSum,
-    VectorSymbol,
-    split_coefficient,
-    split_factor,
-    vector_sum,
-)
 from kincompile.derivations.joint_terms import abbreviations, parts
 from kincompile.model.arguments import Kind
 from kincompile.model.expressions import evaluate
@@ -30,7 +24,6 @@ from kincompile.view.picture import Arrow, picture
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from kincompile.calculus.expressions import Vector
     from kincompile.derivations.evaluation import Evaluation
     from kincompile.report.picture import Picture
     from kincompile.view.drawing import Drawing
@@ -149,13 +142,13 @@ class Figures:
         expansion = Expansion(SymbolicEnvironment(joint), joint.template.dimension)
         values = self.evaluation.values
 
-        def where(terms: list[Vector]) -> Array:
-            components = expansion.vector(vector_sum(tuple(terms)))
+        def where(terms: list[ex.Vector]) -> Array:
+            components = expansion.vector(ex.vector_sum(tuple(terms)))
             return np.array([evaluate(value, dict(values)) or 0.0 for value in components])
 
         for vector, glyph in abbreviations(joint.template).items():
-            if isinstance(vector, VectorSum) and not glyph.dots:
-                signs = [split_coefficient(split_factor(term)[0])[0] for term in vector.terms]
+            if isinstance(vector, ex.VectorSum) and not glyph.dots:
+                signs = [ex.split_coefficient(ex.split_factor(term)[0])[0] for term in vector.terms]
                 pairs = list(zip(vector.terms, signs, strict=True))
                 positive = [term for term, sign in pairs if sign > 0]
                 negative = [-term for term, sign in pairs if sign < 0]
@@ -172,5 +165,5 @@ def _fixed_vectors(joint: Joint) -> Iterator[tuple[str, bool]]:
     given = {item.symbol: item.kind for item in arguments if item.kind in (Kind.POINT, Kind.AXIS)}
     yield from ((symbol, kind is Kind.POINT) for symbol, kind in given.items())
     occurring = (item for Phi in joint.template.Phi for item in parts(Phi))
-    symbols = dict.fromkeys(x.name for x in occurring if isinstance(x, VectorSymbol))
+    symbols = dict.fromkeys(x.name for x in occurring if isinstance(x, ex.VectorSymbol))
     yield from ((name, False) for name in symbols if name in joint.points.keys() - given.keys())

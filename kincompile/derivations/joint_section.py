@@ -29,30 +29,8 @@ from kincompile.derive.rules import Rule
 from kincompile.model.arguments import Kind
 from kincompile.model.expressions import depends_on, evaluate
 from kincompile.model.symbolic import SymbolicEnvironment
-from kincompile.report.document import (
-    Chapter,
-    Display,
-    Figure,
-    Math,
-    Verbatim,
-    table,
-    text,
-)
-from kincompile.report.formulas import (
-    GAMMA_TERMS,
-    PHI_Q,
-    PHI_T,
-    ZERO_BLOCK,
-    Decimal,
-    DerivativeSymbol,
-    Equated,
-    Glyph,
-    Matrix,
-    Sub,
-    column,
-    decimals,
-    size,
-)
+from kincompile.report import document as doc
+from kincompile.report import formulas as fm
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -64,12 +42,10 @@ if TYPE_CHECKING:
     from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Joint
     from kincompile.model.resolve_loads import AppliedLoad
-    from kincompile.report.document import Block, Run, Runs, Table
-    from kincompile.report.formulas import Formula
     from kincompile.report.picture import Picture
 
 
-def joint_section(figures: Figures, joint: Joint, rows: Rows) -> Chapter:
+def joint_section(figures: Figures, joint: Joint, rows: Rows) -> doc.Chapter:
     """Return the derivation of a joint."""
     columns = [name for name in joint.columns if name is not None]
     blocks = derive(joint.template)
@@ -84,7 +60,7 @@ class JointSteps(Steps[RowBlock]):
 
     joint: Joint
 
-    def nine(self, picture: Picture | None) -> Chapter:
+    def nine(self, picture: Picture | None) -> doc.Chapter:
         """Return all steps, the figure in the first."""
         return self.section(
             self.joint.type_name,
@@ -100,10 +76,10 @@ class JointSteps(Steps[RowBlock]):
             self.numbers(*self.matrices(), *self.vectors()),
         )
 
-    def symbol(self, letter: str, k: int) -> Glyph:
+    def symbol(self, letter: str, k: int) -> fm.Glyph:
         """Return the symbol of a row block, numbered where there are several."""
         index = str(k + 1) if len(self.derivatives) > 1 else ""
-        return Glyph(letter, index, exponent=self.name)
+        return fm.Glyph(letter, index, exponent=self.name)
 
     @property
     def is_trivial(self) -> bool:
@@ -113,97 +89,97 @@ class JointSteps(Steps[RowBlock]):
         ]
         return all(step.rule is Rule.SUM for step in telling(steps))
 
-    def attributes(self, picture: Picture | None) -> Chapter:
+    def attributes(self, picture: Picture | None) -> doc.Chapter:
         """Return the step of the attributes, as written and in numbers."""
         written = type(self.joint.written)
         meaning = (written.__doc__ or "").strip().splitlines()[0]
-        source = text(f"{meaning} Source: {self.joint.source}.")
+        source = doc.text(f"{meaning} Source: {self.joint.source}.")
         attributes = attributes_table(self.joint, self.evaluation.values)
-        figure = [] if picture is None else [Figure(picture)]
+        figure = [] if picture is None else [doc.Figure(picture)]
         return self.step(1, "The joint and its attributes", source, *figure, attributes, level="")
 
-    def constraint(self) -> Chapter:
+    def constraint(self) -> doc.Chapter:
         """Return the step of Phi, with the abbreviations in it."""
-        blocks: list[Block] = []
+        blocks: list[doc.Block] = []
         for k, block in enumerate(self.derivatives):
-            zero = ZERO_BLOCK if isinstance(block.Phi, Vector) else ZERO
-            blocks.append(Display(Equated((self.symbol("Phi", k), block.Phi, zero))))
+            zero = fm.ZERO_BLOCK if isinstance(block.Phi, Vector) else ZERO
+            blocks.append(doc.Display(fm.Equated((self.symbol("Phi", k), block.Phi, zero))))
         names = abbreviations(self.joint.template)
         if names:
-            blocks.append(text("with"))
-            blocks += [Display(Equated((glyph, item))) for item, glyph in names.items()]
+            blocks.append(doc.text("with"))
+            blocks += [doc.Display(fm.Equated((glyph, item))) for item, glyph in names.items()]
         return self.step(2, "The constraint in vectors", *blocks)
 
-    def rules(self) -> Chapter:
+    def rules(self) -> doc.Chapter:
         """Return the step of the rules that fired for Phi_q."""
         rows = []
         for k, row in enumerate(partials(self.joint.template)):
             for item in row:
-                label = Math(DerivativeSymbol(self.symbol("Phi", k), item.coordinate))
+                label = doc.Math(fm.DerivativeSymbol(self.symbol("Phi", k), item.coordinate))
                 rows += [(label, *line) for line in _rule_lines(item.steps, item.coordinate)]
-        note = text(
-            "The rules that give ", Math(PHI_Q), ", the innermost first. A term in which the "
-            "coordinate does not occur is constant."
+        note = doc.text(
+            "The rules that give ", doc.Math(fm.PHI_Q), ", the innermost first. A term in which "
+            "the coordinate does not occur is constant."
         )  # fmt: skip
         if not rows:
-            note = text("Nothing but constants and coordinates themselves: no rule is needed.")
+            note = doc.text("Nothing but constants and coordinates themselves: no rule is needed.")
             return self.step(3, "The rules used", note)
         header = ("derivative", "rule", "applied to", "gives")
-        return self.step(3, "The rules used", note, table(header, rows))
+        return self.step(3, "The rules used", note, doc.table(header, rows))
 
-    def jacobian(self) -> Chapter:
+    def jacobian(self) -> doc.Chapter:
         """Return the step of the blocks of Phi_q."""
         template = self.joint.template
-        blocks: list[Block] = []
+        blocks: list[doc.Block] = []
         for variable, columns in block_columns(template):
-            shown = Matrix(block_rows(template, columns))
-            symbol = Sub(Glyph("Phi", exponent=self.name), variable)
-            blocks.append(Display(Equated((symbol, shown))))
+            shown = fm.Matrix(block_rows(template, columns))
+            symbol = fm.Sub(fm.Glyph("Phi", exponent=self.name), variable)
+            blocks.append(doc.Display(fm.Equated((symbol, shown))))
         blocks += [
-            text(f"Body {frame.index} is the ground: its coordinates are zero and not unknown, so "
-                 "this block has no columns.")
+            doc.text(f"Body {frame.index} is the ground: its coordinates are zero and not unknown, "
+                     "so this block has no columns.")
             for frame, body in zip(template.frames, self.joint.bodies, strict=True)
             if body.is_ground
         ]  # fmt: skip
         return self.step(4, "The blocks of the Jacobian in vectors", *blocks)
 
-    def nu_notes(self) -> list[Block]:
+    def nu_notes(self) -> list[doc.Block]:
         """Return what is said below nu: the rules used."""
-        lines: list[tuple[Run | Runs, ...]] = []
+        lines: list[tuple[doc.Run | doc.Runs, ...]] = []
         for block in self.derivatives:
-            lines += [(Math(PHI_T), *line) for line in _rule_lines(block.Phi_t_steps)]
+            lines += [(doc.Math(fm.PHI_T), *line) for line in _rule_lines(block.Phi_t_steps)]
         return [*self._constant_note(), *_fired(lines)]
 
-    def gamma_blocks(self) -> list[Block]:
+    def gamma_blocks(self) -> list[doc.Block]:
         """Return gamma term by term, collected, and the rules used."""
-        blocks: list[Block] = []
-        lines: list[tuple[Run | Runs, ...]] = []
+        blocks: list[doc.Block] = []
+        lines: list[tuple[doc.Run | doc.Runs, ...]] = []
         for k, block in enumerate(self.derivatives):
             if len(self.derivatives) > 1:
-                blocks.append(text("For ", Math(self.symbol("Phi", k)), ":"))
+                blocks.append(doc.text("For ", doc.Math(self.symbol("Phi", k)), ":"))
             blocks += [*self.gamma_terms(k), *self._gathered(k)]
-            for symbol, steps in zip(GAMMA_TERMS, block.gamma_steps, strict=True):
-                lines += [(Math(symbol), *line) for line in _rule_lines(steps)]
+            for symbol, steps in zip(fm.GAMMA_TERMS, block.gamma_steps, strict=True):
+                lines += [(doc.Math(symbol), *line) for line in _rule_lines(steps)]
         return [*blocks, *self._constant_note(), *_fired(lines)]
 
-    def _gathered(self, k: int) -> list[Block]:
+    def _gathered(self, k: int) -> list[doc.Block]:
         """Return the k-th gamma with like terms joined, where that is shorter."""
         derived = self.derivatives[k].gamma
         found = collected(derived, abbreviations(self.joint.template))
-        if found == derived or size(found) >= size(derived):
+        if found == derived or fm.size(found) >= fm.size(derived):
             return []
-        note = text("Multiplied out, like terms joined; equal in numbers to the line above:")
-        return [note, Display(Equated((self.symbol("gamma", k), found)))]
+        note = doc.text("Multiplied out, like terms joined; equal in numbers to the line above:")
+        return [note, doc.Display(fm.Equated((self.symbol("gamma", k), found)))]
 
-    def _constant_note(self) -> list[Block]:
+    def _constant_note(self) -> list[doc.Block]:
         """Return the note that the rates of a constant C vanish."""
         expressions = [item for block in self.derivatives for item in parts(block.Phi)]
         if TimeFunction("C") not in expressions or depends_on(self.joint.scalars["C"], ("t",)):
             return []
-        value, rate, second = (Math(TimeFunction("C", order)) for order in range(3))
-        return [text("Here ", value, " is constant: ", rate, " = ", second, " = 0.")]
+        value, rate, second = (doc.Math(TimeFunction("C", order)) for order in range(3))
+        return [doc.text("Here ", value, " is constant: ", rate, " = ", second, " = 0.")]
 
-    def matrices(self) -> Iterator[Block]:
+    def matrices(self) -> Iterator[doc.Block]:
         """Yield the rotation matrices in numbers."""
         template = self.joint.template
         if template.dimension == 3:
@@ -213,94 +189,96 @@ class JointSteps(Steps[RowBlock]):
             angle = evaluate(body.phi, self.evaluation.values) or 0.0
             c, s = np.cos(angle), np.sin(angle)
             for letter, matrix in (("A", [[c, -s], [s, c]]), ("B", [[-s, -c], [c, -s]])):
-                yield Display(Equated((Glyph(letter, frame.index), decimals(np.array(matrix)))))
+                yield doc.Display(
+                    fm.Equated((fm.Glyph(letter, frame.index), fm.decimals(np.array(matrix))))
+                )
 
-    def _rotations(self) -> Iterator[Block]:
+    def _rotations(self) -> Iterator[doc.Block]:
         expansion = Expansion(SymbolicEnvironment(self.joint), 3)
         for frame in self.joint.template.frames:
             entries = [
                 _decimal(x, self.evaluation.values) for x in expansion.entries(frame.rotation)
             ]
             rows = tuple(tuple(entries[k : k + 3]) for k in range(0, 9, 3))
-            yield Display(Equated((Glyph("A", frame.index), Matrix(rows))))
+            yield doc.Display(fm.Equated((fm.Glyph("A", frame.index), fm.Matrix(rows))))
 
-    def vectors(self) -> Iterator[Block]:
+    def vectors(self) -> Iterator[doc.Block]:
         """Yield the turned vectors in numbers."""
         template, values = self.joint.template, self.evaluation.values
         expansion = Expansion(SymbolicEnvironment(self.joint), template.dimension)
-        named: list[tuple[Formula, Vector]] = [(item, item) for item in known_vectors(template)]
+        named: list[tuple[fm.Formula, Vector]] = [(item, item) for item in known_vectors(template)]
         for item, glyph in abbreviations(template).items():
             if isinstance(item, Vector):
                 named.append((glyph, item))
         for symbol, vector in named:
-            yield Display(Equated((symbol, _column(expansion.vector(vector), values))))
+            yield doc.Display(fm.Equated((symbol, _column(expansion.vector(vector), values))))
 
 
-def attributes_table(element: Joint | AppliedLoad, values: Mapping[str, float]) -> Table:
+def attributes_table(element: Joint | AppliedLoad, values: Mapping[str, float]) -> doc.Table:
     """Return the attributes of a joint or a load: as written, and in numbers."""
-    rows: list[tuple[Run | Runs, ...]] = []
+    rows: list[tuple[doc.Run | doc.Runs, ...]] = []
     for name, argument in type(element.written).arguments().items():
         symbol = _attribute_symbol(argument.symbol, argument.kind)
-        shown: tuple[Run, Run]
+        shown: tuple[doc.Run, doc.Run]
         if argument.kind is Kind.BODY:
-            shown = Verbatim(element.bodies["ij".index(argument.symbol)].name), ""
+            shown = doc.Verbatim(element.bodies["ij".index(argument.symbol)].name), ""
         else:
             number = _number(element, argument.symbol, values)
-            shown = Math(_attribute(element, argument.symbol)), number
-        rows.append((Verbatim(name), Math(symbol), *shown))
-    return table(("attribute", "symbol", "as written", "number"), rows)
+            shown = doc.Math(_attribute(element, argument.symbol)), number
+        rows.append((doc.Verbatim(name), doc.Math(symbol), *shown))
+    return doc.table(("attribute", "symbol", "as written", "number"), rows)
 
 
-def _number(element: Joint | AppliedLoad, symbol: str, values: Mapping[str, float]) -> Run:
+def _number(element: Joint | AppliedLoad, symbol: str, values: Mapping[str, float]) -> doc.Run:
     """Return an attribute in numbers; a profile has none."""
     if symbol in element.points:
-        return Math(_column(element.points[symbol], values))
+        return doc.Math(_column(element.points[symbol], values))
     if symbol in element.scalars:
-        return Math(_decimal(element.scalars[symbol], values))
+        return doc.Math(_decimal(element.scalars[symbol], values))
     return ""
 
 
-def _attribute_symbol(symbol: str, kind: Kind) -> Formula:
+def _attribute_symbol(symbol: str, kind: Kind) -> fm.Formula:
     if kind is Kind.BODY:
-        return Glyph(symbol, bold=False)
+        return fm.Glyph(symbol, bold=False)
     if kind in (Kind.POINT, Kind.AXIS, Kind.LOADS):
         return VectorSymbol(symbol)
     return TimeFunction(symbol) if symbol == "C" else Letter(symbol)
 
 
-def _attribute(joint: Joint | AppliedLoad, symbol: str) -> Formula:
+def _attribute(joint: Joint | AppliedLoad, symbol: str) -> fm.Formula:
     if symbol in joint.points:
-        return column(tuple(_as_written(value) for value in joint.points[symbol]))
+        return fm.column(tuple(_as_written(value) for value in joint.points[symbol]))
     if symbol in joint.profiles:
         return joint.profiles[symbol]
     return _as_written(joint.scalars[symbol])
 
 
-def _as_written(value: Scalar) -> Formula:
+def _as_written(value: Scalar) -> fm.Formula:
     """Return a number in its digits, or an expression."""
     expression: sympy.Expr = sympy.sympify(value)
-    return Decimal(float(expression), 12) if expression.is_Float else expression
+    return fm.Decimal(float(expression), 12) if expression.is_Float else expression
 
 
 def _rule_lines(
     steps: Sequence[Step], coordinate: Expression | None = None
-) -> Iterator[tuple[Runs, Run, Run]]:
+) -> Iterator[tuple[doc.Runs, doc.Run, doc.Run]]:
     for item in telling(steps):
-        gives: Formula = item.derivative
+        gives: fm.Formula = item.derivative
         if coordinate is not None:
             gives = block_entry(item.derivative, coordinate, item.expression)
-        yield RULES[item.rule], Math(item.expression), Math(gives)
+        yield RULES[item.rule], doc.Math(item.expression), doc.Math(gives)
 
 
-def _fired(lines: list[tuple[Run | Runs, ...]]) -> list[Block]:
+def _fired(lines: list[tuple[doc.Run | doc.Runs, ...]]) -> list[doc.Block]:
     header = ("for", "rule", "applied to", "gives")
-    return [table(header, lines, "The rules used")] if lines else []
+    return [doc.table(header, lines, "The rules used")] if lines else []
 
 
-def _column(values: Sequence[Scalar], known: Mapping[str, float]) -> Matrix:
-    return column(tuple(_decimal(value, known) for value in values))
+def _column(values: Sequence[Scalar], known: Mapping[str, float]) -> fm.Matrix:
+    return fm.column(tuple(_decimal(value, known) for value in values))
 
 
-def _decimal(value: Scalar, known: Mapping[str, float]) -> Decimal:
+def _decimal(value: Scalar, known: Mapping[str, float]) -> fm.Decimal:
     number = evaluate(value, dict(known))
-    return Decimal(float("nan") if number is None else number)
+    return fm.Decimal(float("nan") if number is None else number)

@@ -10,16 +10,8 @@ from kincompile.calculus.rotations import PlaneRotation
 from kincompile.calculus.space import EulerRotation, TurnedFrame
 from kincompile.derive.partials import partials
 from kincompile.derive.rules import Rule, along
+from kincompile.report import formulas as fm
 from kincompile.report.document import Math
-from kincompile.report.formulas import (
-    IDENTITY,
-    ZERO_BLOCK,
-    DerivativeSymbol,
-    Equated,
-    Glyph,
-    Joined,
-    Transposed,
-)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -27,10 +19,9 @@ if TYPE_CHECKING:
     from kincompile.calculus.template import Template
     from kincompile.derive.rules import Step
     from kincompile.report.document import Runs
-    from kincompile.report.formulas import Formula
 
 _PHI = ex.Symbol("phi")
-_A, _B = Glyph("A"), Glyph("B")
+_A, _B = fm.Glyph("A"), fm.Glyph("B")
 _TURNING = ex.RotationSlope(
     EulerRotation(ex.VectorSymbol("p", 4)), ex.VectorSymbol("omega", 3), is_small=True
 )
@@ -40,11 +31,11 @@ RULES: Mapping[Rule, Runs] = {
     Rule.SUM: ("sum rule",),
     Rule.PRODUCT: ("product rule",),
     Rule.CHAIN: ("chain rule",),
-    Rule.A_TO_B: (Math(Equated((DerivativeSymbol(_A, _PHI, "d"), _B))),),
-    Rule.B_TO_A: (Math(Equated((DerivativeSymbol(_B, _PHI, "d"), Joined(("-", _A))))),),
+    Rule.A_TO_B: (Math(fm.Equated((fm.DerivativeSymbol(_A, _PHI, "d"), _B))),),
+    Rule.B_TO_A: (Math(fm.Equated((fm.DerivativeSymbol(_B, _PHI, "d"), fm.Joined(("-", _A))))),),
     Rule.A_TO_SLOPE: ("d(A s) = B(p, s) dp",),
     Rule.SLOPE: ("d(B(p, s) w) = B(w, s) dp",),
-    Rule.TURN: (Math(Equated((Glyph("A", dots=1), _TURNING))),),
+    Rule.TURN: (Math(fm.Equated((fm.Glyph("A", dots=1), _TURNING))),),
     Rule.ANGLE: ("d atan2(s, c) = (c ds - s dc)/(s² + c²)",),
     Rule.DRIVER: ("driver, a function of ", Math(ex.Symbol("t"))),
     Rule.PROFILE: ("profile, chain rule",),
@@ -75,21 +66,21 @@ def parts(expression: Any) -> Iterator[ex.Expression]:
         yield from parts(item)
 
 
-def abbreviations(template: Template) -> dict[ex.Expression, Glyph]:
+def abbreviations(template: Template) -> dict[ex.Expression, fm.Glyph]:
     """Name what occurs again and again: the distance vector d, the angle of a gear, their rates."""
     found = [item for Phi in template.Phi for item in parts(Phi)]
     separations = list(dict.fromkeys(v for item in found for v in _separations(item)))
     q_dot = template.motion
-    names: dict[ex.Expression, Glyph] = {}
+    names: dict[ex.Expression, fm.Glyph] = {}
     for k, vector in enumerate(separations, 1):
         index = str(k) if len(separations) > 1 else ""
-        names[vector] = Glyph("d", index)
-        names[along(vector, q_dot)] = Glyph("d", index, dots=1)
+        names[vector] = fm.Glyph("d", index)
+        names[along(vector, q_dot)] = fm.Glyph("d", index, dots=1)
     for item in found:
         match item:
             case ex.Rotated(PlaneRotation(angle), ex.Basis()) if not isinstance(angle, ex.Symbol):
-                names[angle] = Glyph("vartheta", bold=False)
-                names[along(angle, q_dot)] = Glyph("vartheta", dots=1, bold=False)
+                names[angle] = fm.Glyph("vartheta", bold=False)
+                names[along(angle, q_dot)] = fm.Glyph("vartheta", dots=1, bold=False)
     return names
 
 
@@ -106,38 +97,38 @@ def is_zero(entry: ex.Expression) -> bool:
     return entry in (ex.ZERO, ex.ZERO_VECTOR)
 
 
-def block_entry(entry: ex.Expression, coordinate: ex.Expression, Phi: ex.Expression) -> Formula:
+def block_entry(entry: ex.Expression, coordinate: ex.Expression, Phi: ex.Expression) -> fm.Formula:
     """Return an entry of Phi_q as the textbook writes it: k I, a row u^T, or the entry itself."""
     if is_zero(entry):
-        return ZERO_BLOCK if isinstance(coordinate, ex.Vector) else entry
+        return fm.ZERO_BLOCK if isinstance(coordinate, ex.Vector) else entry
     if isinstance(coordinate, ex.Symbol):
         return entry
     if isinstance(Phi, ex.Vector):
         return _times_identity(entry) if isinstance(entry, ex.Scalar) else entry
     assert isinstance(entry, ex.Vector)
-    return Transposed(entry)
+    return fm.Transposed(entry)
 
 
-def _times_identity(factor: ex.Scalar) -> Formula:
+def _times_identity(factor: ex.Scalar) -> fm.Formula:
     if factor == ex.ONE:
-        return IDENTITY
-    return Joined(("-", IDENTITY)) if factor == -ex.ONE else Joined((factor, IDENTITY))
+        return fm.IDENTITY
+    return fm.Joined(("-", fm.IDENTITY)) if factor == -ex.ONE else fm.Joined((factor, fm.IDENTITY))
 
 
-def block_columns(template: Template) -> list[tuple[Formula, slice]]:
+def block_columns(template: Template) -> list[tuple[fm.Formula, slice]]:
     """Return what each block of Phi_q is a derivative by, q_i or alpha_i, and its coordinates."""
     ends = accumulate((len(item.coordinates) for item in template.owners), initial=0)
-    names: list[Formula] = [
-        Joined((frame.r, ",", frame.coordinates[1]))
+    names: list[fm.Formula] = [
+        fm.Joined((frame.r, ",", frame.coordinates[1]))
         if isinstance(frame, TurnedFrame)
-        else Glyph("q", frame.index)
+        else fm.Glyph("q", frame.index)
         for frame in template.frames
     ]
     names += [contact.alpha for contact in template.contacts]
     return [(name, slice(*own)) for name, own in zip(names, pairwise(ends), strict=True)]
 
 
-def block_rows(template: Template, coordinates: slice) -> tuple[tuple[Formula, ...], ...]:
+def block_rows(template: Template, coordinates: slice) -> tuple[tuple[fm.Formula, ...], ...]:
     """Return the block of Phi_q by some coordinates, a row for each row block."""
     return tuple(
         tuple(block_entry(item.entry, item.coordinate, Phi) for item in row[coordinates])

@@ -7,17 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sympy
 
-from kincompile.calculus.expressions import (
-    ZERO,
-    Norm,
-    Scalar,
-    Sum,
-    Vector,
-    VectorSum,
-    dot,
-    split_factor,
-    sum_of,
-)
+from kincompile.calculus import expressions as ex
 from kincompile.derivations.joint_section import attributes_table
 from kincompile.derivations.joint_terms import parts
 from kincompile.derive.loads import derive_load
@@ -25,35 +15,22 @@ from kincompile.derive.rules import along
 from kincompile.ir.interpret import interpret
 from kincompile.model.expressions import evaluate
 from kincompile.model.matrices import load_entries
+from kincompile.report import formulas as fm
 from kincompile.report.document import Chapter, Display, Math, Verbatim, table, text
-from kincompile.report.formulas import (
-    LAMBDA,
-    MASS,
-    Q_DDOT,
-    Decimal,
-    Equated,
-    Glyph,
-    Joined,
-    Sub,
-    Transposed,
-    decimals,
-)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from kincompile.calculus.expressions import Expression
     from kincompile.calculus.symbols import Frame
     from kincompile.derivations.evaluation import Evaluation
     from kincompile.derive.loads import LoadTemplate
     from kincompile.derive.rules import Direction
     from kincompile.model.resolve_loads import AppliedLoad
     from kincompile.report.document import Block, Run, Runs
-    from kincompile.report.formulas import Formula
 
-FORCES, DELTA = Glyph("Q"), Glyph("delta", bold=False)
-PHI_Q_TRANSPOSED = Glyph("Phi", "q", exponent="T")
-WORK, ENERGY = Joined((DELTA, Glyph("W", bold=False))), Glyph("T", bold=False)
+FORCES, DELTA = fm.Glyph("Q"), fm.Glyph("delta", bold=False)
+PHI_Q_TRANSPOSED = fm.Glyph("Phi", "q", exponent="T")
+WORK, ENERGY = fm.Joined((DELTA, fm.Glyph("W", bold=False))), fm.Glyph("T", bold=False)
 
 LARGEST_SYSTEM = 9
 """Coordinates up to which M is written out in numbers."""
@@ -64,33 +41,33 @@ def loads_section(evaluation: Evaluation) -> Chapter:
     note = text(
         "A load is written down as the work that it does when what it acts on moves by a little, "
         "a mass also as its kinetic energy. ", Math(FORCES), " is that work for unit "
-        "displacements, with ", Math(Joined((Sub(ENERGY, Glyph("q")), ))),
-        " less the rate of the momenta; ", Math(MASS), " is the second derivative of the energy "
+        "displacements, with ", Math(fm.Joined((fm.Sub(ENERGY, fm.Glyph("q")), ))),
+        " less the rate of the momenta; ", Math(fm.MASS), " is the second derivative of the energy "
         "by the rates.",
     )  # fmt: skip
     sections = (*(_section(evaluation, load) for load in evaluation.system.loads),)
     return Chapter("loads", ("Masses and loads",), (note,), (*sections, _motion(evaluation)))
 
 
-def load_abbreviations(template: LoadTemplate) -> dict[Expression, Glyph]:
+def load_abbreviations(template: LoadTemplate) -> dict[ex.Expression, fm.Glyph]:
     """Name the vector between the points of a load and its rate, torque and rate of a hinge."""
     q_dot: Direction = dict(zip(template.coordinates, template.rates, strict=True))
     found = (item for _, moved in template.work for item in parts(moved))
-    names: dict[Expression, Glyph] = {}
+    names: dict[ex.Expression, fm.Glyph] = {}
     for item in found:
-        if isinstance(item, Norm) and isinstance(item.vector, VectorSum):
-            names[item.vector] = Glyph("d")
-            names[along(item.vector, q_dot)] = Glyph("d", dots=1)
+        if isinstance(item, ex.Norm) and isinstance(item.vector, ex.VectorSum):
+            names[item.vector] = fm.Glyph("d")
+            names[along(item.vector, q_dot)] = fm.Glyph("d", dots=1)
     if len(template.frames) > 1 and len(template.work) > 1:  # a couple about a hinge in space
-        rates: list[Scalar] = []
+        rates: list[ex.Scalar] = []
         for force, moved in template.work:
-            assert isinstance(force, Vector)
-            assert isinstance(moved, Vector)
-            torque, way = split_factor(force)
-            rates.append(dot(way, along(moved, q_dot)))
-            if isinstance(torque, Sum):
-                names[torque] = Glyph("tau", bold=False)
-        names[sum_of(tuple(rates))] = Glyph("omega", bold=False)
+            assert isinstance(force, ex.Vector)
+            assert isinstance(moved, ex.Vector)
+            torque, way = ex.split_factor(force)
+            rates.append(ex.dot(way, along(moved, q_dot)))
+            if isinstance(torque, ex.Sum):
+                names[torque] = fm.Glyph("tau", bold=False)
+        names[ex.sum_of(tuple(rates))] = fm.Glyph("omega", bold=False)
     return names
 
 
@@ -114,16 +91,16 @@ def _step(load: AppliedLoad, number: int, title: str, *blocks: Block, level: str
 def _works(load: AppliedLoad) -> Iterator[Block]:
     """Yield kinetic energy and virtual work, as they were written down."""
     template = load.template
-    if template.energy != ZERO:
-        yield Display(Equated((ENERGY, template.energy)))
+    if template.energy != ex.ZERO:
+        yield Display(fm.Equated((ENERGY, template.energy)))
     for force, moved in template.work:
-        first: Formula = Transposed(force) if isinstance(force, Vector) else force
-        opened = ("(", first, ")") if isinstance(force, Scalar) else (first,)
-        yield Display(Equated((WORK, Joined((*opened, DELTA, "(", moved, ")")))))
+        first: fm.Formula = fm.Transposed(force) if isinstance(force, ex.Vector) else force
+        opened = ("(", first, ")") if isinstance(force, ex.Scalar) else (first,)
+        yield Display(fm.Equated((WORK, fm.Joined((*opened, DELTA, "(", moved, ")")))))
     if names := load_abbreviations(template):
         yield text("with")
         for item, glyph in names.items():
-            yield Display(Equated((glyph, item)))
+            yield Display(fm.Equated((glyph, item)))
 
 
 def _derived(load: AppliedLoad) -> Iterator[Block]:
@@ -131,29 +108,29 @@ def _derived(load: AppliedLoad) -> Iterator[Block]:
     found = derive_load(load.template, load.others, varies=load.varies)
     names = [name for frame in load.template.frames for name in _components(frame)]
     for coordinate, force in zip(names, found.Q, strict=True):
-        if force != ZERO:
-            yield Display(Equated((Sub(FORCES, coordinate), force)))
+        if force != ex.ZERO:
+            yield Display(fm.Equated((fm.Sub(FORCES, coordinate), force)))
     for row, entries in enumerate(found.M):
         for column, entry in enumerate(entries[row:], row):
-            if entry != ZERO:
-                both = Joined((names[row], ",", names[column]))
-                yield Display(Equated((Sub(MASS, both), entry)))
+            if entry != ex.ZERO:
+                both = fm.Joined((names[row], ",", names[column]))
+                yield Display(fm.Equated((fm.Sub(fm.MASS, both), entry)))
 
 
-def _components(frame: Frame) -> Iterator[Formula]:
+def _components(frame: Frame) -> Iterator[fm.Formula]:
     """Yield the symbols of the coordinates of a body, one by one."""
     for item in frame.coordinates:
         if item == frame.r:
-            yield from (Glyph(letter, frame.index, bold=False) for letter in "xyz"[: item.size])
+            yield from (fm.Glyph(letter, frame.index, bold=False) for letter in "xyz"[: item.size])
         elif item.size > 1:
-            yield from (Glyph(f"e{k}", frame.index, bold=False) for k in range(item.size))
+            yield from (fm.Glyph(f"e{k}", frame.index, bold=False) for k in range(item.size))
         else:
             yield item
 
 
 def _expanded(evaluation: Evaluation, load: AppliedLoad) -> Iterator[Block]:
     names = evaluation.coordinates
-    for quantity, symbol in (("Q", FORCES), ("M", MASS)):
+    for quantity, symbol in (("Q", FORCES), ("M", fm.MASS)):
         rows: list[tuple[Run | Runs, ...]] = []
         for row, column, value in load_entries(evaluation.system, load, quantity):
             if value == 0 or (quantity == "M" and column < row):
@@ -162,7 +139,7 @@ def _expanded(evaluation: Evaluation, load: AppliedLoad) -> Iterator[Block]:
             if quantity == "M":
                 places = (*places, ", ", Verbatim(names[column]))
             number = evaluate(value, dict(evaluation.values))
-            shown = Math(Decimal(float("nan") if number is None else number))
+            shown = Math(fm.Decimal(float("nan") if number is None else number))
             rows.append((places, Math(sympy.sympify(value)), shown))
         if rows:
             yield table(("row", Math(symbol), "number"), rows)
@@ -174,20 +151,20 @@ def _motion(evaluation: Evaluation) -> Chapter:
     found = dict(
         zip((item.name for item in program.quantities), interpret(program, *states), strict=True)
     )
-    whole = Joined((MASS, Q_DDOT, "+", PHI_Q_TRANSPOSED, LAMBDA))
-    blocks: list[Block] = [Display(Equated((whole, FORCES)))]
+    whole = fm.Joined((fm.MASS, fm.Q_DDOT, "+", PHI_Q_TRANSPOSED, fm.LAMBDA))
+    blocks: list[Block] = [Display(fm.Equated((whole, FORCES)))]
     if len(evaluation.coordinates) <= LARGEST_SYSTEM:
         blocks.append(text(f"At {evaluation.origin}:"))
-        blocks += [Display(Equated((MASS, decimals(found["M"]))))]
-        blocks += [Display(Equated((FORCES, decimals(found["Q"]))))]
+        blocks += [Display(fm.Equated((fm.MASS, fm.decimals(found["M"]))))]
+        blocks += [Display(fm.Equated((FORCES, fm.decimals(found["Q"]))))]
     sides = found["Q"] - found["M"] @ evaluation.q_ddot
     if evaluation.is_assembled and np.isfinite(sides).all():
         factors = np.linalg.lstsq(evaluation.Phi_q.T, sides, rcond=None)[0]
         equations = evaluation.system.equations
         rows: list[tuple[Run | Runs, ...]] = [
-            (Verbatim(name), Math(Decimal(float(value))))
+            (Verbatim(name), Math(fm.Decimal(float(value))))
             for name, value in zip(equations, factors, strict=True)
         ]
         moved = text("With the acceleration of the motion the multipliers follow, the reactions:")
-        blocks += [moved, table(("equation", Math(LAMBDA)), rows)]
+        blocks += [moved, table(("equation", Math(fm.LAMBDA)), rows)]
     return Chapter("motion", ("The equations of motion",), tuple(blocks), (), "numeric")

@@ -6,29 +6,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from kincompile.report.document import (
-    Chapter,
-    Display,
-    Math,
-    NotebookCode,
-    Verbatim,
-    row_range,
-    table,
-    text,
-)
-from kincompile.report.formulas import (
-    GAMMA,
-    GAMMA_TERMS,
-    NU,
-    PHI,
-    PHI_Q,
-    PHI_T,
-    VELOCITY_TERM,
-    Decimal,
-    Equated,
-    Joined,
-    decimals,
-)
+from kincompile.report import document as doc
+from kincompile.report import formulas as fm
 from kincompile.tables import counted
 
 if TYPE_CHECKING:
@@ -41,8 +20,6 @@ if TYPE_CHECKING:
     from kincompile.derive.derivation import RowBlock
     from kincompile.derive.equations import EquationDerivatives
     from kincompile.ir.inline import ConstraintRows as Rows
-    from kincompile.report.document import Block, Run, Runs
-    from kincompile.report.formulas import Formula, Glyph
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 
@@ -63,49 +40,51 @@ class Steps(ABC, Generic[Derived]):
     level: str  # level of the steps that are derived: "vector" or "expanded"
 
     @abstractmethod
-    def symbol(self, letter: str, k: int) -> Glyph:
+    def symbol(self, letter: str, k: int) -> fm.Glyph:
         """Return the symbol of the k-th Phi, nu or gamma."""
 
-    def section(self, kind: str, is_driver: bool, *steps: Chapter) -> Chapter:
+    def section(self, kind: str, is_driver: bool, *steps: doc.Chapter) -> doc.Chapter:
         """Return the steps under the kind and the name of the constraint."""
         title = f"{kind} (driver) " if is_driver else f"{kind} "
-        names: Runs = (title, Verbatim(self.name))
-        return Chapter(f"constraint-{self.name}", names, (), steps, is_folded=self.is_trivial)
+        names: doc.Runs = (title, doc.Verbatim(self.name))
+        return doc.Chapter(f"constraint-{self.name}", names, (), steps, is_folded=self.is_trivial)
 
     @property
     def is_trivial(self) -> bool:
         """Whether the derivation needs no rule, so that it is folded away."""
         return False
 
-    def step(self, number: int, title: str, *blocks: Block, level: str | None = None) -> Chapter:
+    def step(
+        self, number: int, title: str, *blocks: doc.Block, level: str | None = None
+    ) -> doc.Chapter:
         """Return one step, of the level of the derived ones unless another is given."""
         level = self.level if level is None else level
-        return Chapter(f"{self.name}-step-{number}", (f"{number}. {title}",), blocks, (), level)
+        return doc.Chapter(f"{self.name}-step-{number}", (f"{number}. {title}",), blocks, (), level)
 
-    def nu(self, *notes: Block) -> Chapter:
+    def nu(self, *notes: doc.Block) -> doc.Chapter:
         """Return the step of the velocity equation, with notes below it."""
         lines = [
-            Display(Equated((self.symbol("nu", k), Joined(("-", PHI_T)), item.nu)))
+            doc.Display(fm.Equated((self.symbol("nu", k), fm.Joined(("-", fm.PHI_T)), item.nu)))
             for k, item in enumerate(self.derivatives)
         ]
         return self.step(5, "The right side of the velocity equation", *lines, *notes)
 
-    def gamma_terms(self, k: int) -> list[Block]:
+    def gamma_terms(self, k: int) -> list[doc.Block]:
         """Return the k-th gamma, term by term."""
         item = self.derivatives[k]
-        terms: list[tuple[Formula, Formula]] = [(VELOCITY_TERM, item.velocity)]
-        terms += zip(GAMMA_TERMS, item.gamma_terms, strict=True)
+        terms: list[tuple[fm.Formula, fm.Formula]] = [(fm.VELOCITY_TERM, item.velocity)]
+        terms += zip(fm.GAMMA_TERMS, item.gamma_terms, strict=True)
         terms.append((self.symbol("gamma", k), item.gamma))
-        return [Display(Equated(pair)) for pair in terms]
+        return [doc.Display(fm.Equated(pair)) for pair in terms]
 
-    def gamma(self, *blocks: Block) -> Chapter:
+    def gamma(self, *blocks: doc.Block) -> doc.Chapter:
         """Return the step of the acceleration equation."""
         title = "The right side of the acceleration equation, term by term"
         return self.step(6, title, *blocks)
 
-    def expansion(self) -> Chapter:
+    def expansion(self) -> doc.Chapter:
         """Return the step in which everything is written out: the emitted code."""
-        note = text(
+        note = doc.text(
             "This is what the emitted module computes, with its intermediate values written out. "
             "Entries of the Jacobian that are not listed are zero."
         )
@@ -114,17 +93,17 @@ class Steps(ABC, Generic[Derived]):
         title = "Written out in components" if is_spatial else "Expanded to sines and cosines"
         return self.step(7, title, note, *lines, level="expanded")
 
-    def placement(self) -> Chapter:
+    def placement(self) -> doc.Chapter:
         """Return the step that gives the rows and columns of the constraint."""
         first, count = self.rows.instance.first_row, len(self.rows.entries["Phi"])
-        note = text(
+        note = doc.text(
             f"{counted(count, 'equation')}; the constraints before have {first}: that is the row "
-            f"offset. {'Row' if count == 1 else 'Rows'} {row_range(first, count)} counted from 0, "
-            f"{row_range(first + 1, count)} counted from 1."
+            f"offset. {'Row' if count == 1 else 'Rows'} {doc.row_range(first, count)} counted from "
+            f"0, {doc.row_range(first + 1, count)} counted from 1."
         )
         names = self.names
-        lines = [(Verbatim(names[k]), str(k), str(k + 1)) for k in self.column_numbers()]
-        columns = table(("coordinate", "column from 0", "from 1"), lines)
+        lines = [(doc.Verbatim(names[k]), str(k), str(k + 1)) for k in self.column_numbers()]
+        columns = doc.table(("coordinate", "column from 0", "from 1"), lines)
         title = "Placement by row and column offset"
         return self.step(8, title, note, columns, level="expanded")
 
@@ -137,35 +116,42 @@ class Steps(ABC, Generic[Derived]):
         """Return the columns of Phi_q in which something can stand."""
         return sorted({entry.column for entry in self.rows.entries["Phi_q"]})
 
-    def numbers(self, *vectors: Block) -> Chapter:
+    def numbers(self, *vectors: doc.Block) -> doc.Chapter:
         """Return the step in numbers: the state, vectors, then Phi, Phi_q, nu and gamma."""
-        blocks = (text(f"At {self.evaluation.origin}:"), self._state(), *vectors)
+        blocks = (doc.text(f"At {self.evaluation.origin}:"), self._state(), *vectors)
         return self.step(9, "In numbers", *blocks, *self._results(), level="numeric")
 
-    def _state(self) -> Block:
+    def _state(self) -> doc.Block:
         evaluation = self.evaluation
-        rows: list[tuple[Run | Runs, ...]] = []
+        rows: list[tuple[doc.Run | doc.Runs, ...]] = []
         for name in self.columns:
             k = evaluation.coordinates.index(name)
-            numbers = (Math(Decimal(evaluation.shown[key][k])) for key in ("q", "q_dot"))
-            rows.append((Verbatim(name), *numbers))
-        return table(("coordinate", "value", "rate"), rows)
+            numbers = (doc.Math(fm.Decimal(evaluation.shown[key][k])) for key in ("q", "q_dot"))
+            rows.append((doc.Verbatim(name), *numbers))
+        return doc.table(("coordinate", "value", "rate"), rows)
 
     def arrays(self, rows: slice, columns: Sequence[int]) -> Mapping[str, NDArray[np.float64]]:
         """Return Phi, nu, gamma and some columns of Phi_q in numbers."""
         shown = {key: self.evaluation.shown[key][rows] for key in QUANTITIES}
         return shown | {"Phi_q": shown["Phi_q"][:, columns]}
 
-    def _results(self) -> Sequence[Block]:
+    def _results(self) -> Sequence[doc.Block]:
         first, count = self.rows.instance.first_row, len(self.rows.entries["Phi"])
         columns = self.column_numbers()
-        names: list[Run] = []
+        names: list[doc.Run] = []
         for column in columns:
-            names += [", " if names else "", Verbatim(self.names[column])]
+            names += [", " if names else "", doc.Verbatim(self.names[column])]
         shown = self.arrays(slice(first, first + count), columns)
         phi, phi_q, nu, gamma = (
-            Display(Equated((replace(symbol, exponent=self.name), decimals(shown[key]))))
-            for key, symbol in zip(QUANTITIES, (PHI, PHI_Q, NU, GAMMA), strict=True)
+            doc.Display(fm.Equated((replace(symbol, exponent=self.name), fm.decimals(shown[key]))))
+            for key, symbol in zip(QUANTITIES, (fm.PHI, fm.PHI_Q, fm.NU, fm.GAMMA), strict=True)
         )
         code = f"rows = slice({first}, {first + count})  # {self.name}\nprint(Phi_q(q, t, p)[rows])"
-        return (phi, text("In the columns of ", *names, ":"), phi_q, nu, gamma, NotebookCode(code))
+        return (
+            phi,
+            doc.text("In the columns of ", *names, ":"),
+            phi_q,
+            nu,
+            gamma,
+            doc.NotebookCode(code),
+        )

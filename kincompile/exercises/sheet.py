@@ -14,33 +14,14 @@ from kincompile.derivations.evaluation import evaluation
 from kincompile.derivations.figures import Figures
 from kincompile.model.resolve import Joint
 from kincompile.names import rate
-from kincompile.report.document import (
-    Chapter,
-    Display,
-    Figure,
-    Manuscript,
-    Math,
-    Verbatim,
-    table,
-    text,
-)
-from kincompile.report.formulas import (
-    VELOCITY_TERM,
-    Call,
-    DerivativeSymbol,
-    Equated,
-    Glyph,
-    Joined,
-    Matrix,
-)
+from kincompile.report import document as doc
+from kincompile.report import formulas as fm
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from kincompile.exercises.blanks import Blank
     from kincompile.model.system import ConstraintSystem
-    from kincompile.report.document import Block, Run, Runs
-    from kincompile.report.formulas import Formula
 
 RULE_STEP, BLOCK_STEP, GAMMA_STEP = 2, 3, 5
 """Steps of a derivation, from 0, that hints are taken from."""
@@ -49,98 +30,99 @@ LINE = "_" * 22
 """Where a formula is written on paper."""
 
 
-def sheet(system: ConstraintSystem, blanks: Sequence[Blank], student: str) -> Manuscript:
+def sheet(system: ConstraintSystem, blanks: Sequence[Blank], student: str) -> doc.Manuscript:
     """Return the page of one student."""
     figures = Figures(evaluation(system, None))
     names, chapters = constraint_chapters(figures)
     given = tuple(
-        Chapter(item.anchor, item.title, (), item.sections[:2])
+        doc.Chapter(item.anchor, item.title, (), item.sections[:2])
         for item, constraint in zip(chapters, system.constraints, strict=True)
         if isinstance(constraint, Joint)
     )
     parts = (
         _mechanism(figures),
-        Chapter("given", ("The constraints",), (), given),
+        doc.Chapter("given", ("The constraints",), (), given),
         _tasks(system, blanks),
         _hints(system, blanks, chapters),
     )
     summary = f"Student {student}. Write the formulas into hand_in.txt, which has a line for each."
-    return Manuscript(system.name, summary, parts, names)
+    return doc.Manuscript(system.name, summary, parts, names)
 
 
 def solutions(
     name: str, systems: Sequence[ConstraintSystem], blanks: Sequence[Blank], students: Sequence[str]
-) -> Manuscript:
+) -> doc.Manuscript:
     """Return the page of the instructor: the right formula of every blank of every student."""
     chapters = []
     for system, student in zip(systems, students, strict=True):
         derived = system.Phi_q, system.gamma
-        rows: list[tuple[Run | Runs, ...]] = [
-            (item.name, Math(_symbol(item, system)), Math(item.answer(*derived))) for item in blanks
+        rows: list[tuple[doc.Run | doc.Runs, ...]] = [
+            (item.name, doc.Math(_symbol(item, system)), doc.Math(item.answer(*derived)))
+            for item in blanks
         ]
-        shown = table(("blank", "entry", "formula"), rows)
-        chapters.append(Chapter(f"student-{student}", (f"Student {student}",), (shown,)))
+        shown = doc.table(("blank", "entry", "formula"), rows)
+        chapters.append(doc.Chapter(f"student-{student}", (f"Student {student}",), (shown,)))
     summary = f"{len(systems)} students, {len(blanks)} blanks each. Not for students."
-    return Manuscript(name, summary, tuple(chapters))
+    return doc.Manuscript(name, summary, tuple(chapters))
 
 
-def _mechanism(figures: Figures) -> Chapter:
+def _mechanism(figures: Figures) -> doc.Chapter:
     system = figures.evaluation.system
-    blocks: list[Block] = []
+    blocks: list[doc.Block] = []
     if (shown := figures.mechanism()) is not None:
-        blocks.append(Figure(shown))
+        blocks.append(doc.Figure(shown))
     place = "x and y of its origin and the angle phi of its frame"
     if _is_in_space(system):
         place = "x, y and z of its origin and the Euler parameters of its frame"
-        blocks.append(text(*EULER_PARAMETERS))
+        blocks.append(doc.text(*EULER_PARAMETERS))
     blocks.append(
-        text(
+        doc.text(
             f"The coordinates of a body are {place}; points and directions of bodies are given in "
             "their frames. The ground is fixed."
         )
     )
-    rows: list[tuple[Run | Runs, ...]] = [
-        (Verbatim(body.name), *(Verbatim(name) for name in body.coordinates))
+    rows: list[tuple[doc.Run | doc.Runs, ...]] = [
+        (doc.Verbatim(body.name), *(doc.Verbatim(name) for name in body.coordinates))
         for body in system.bodies
     ]
-    blocks.append(table(("body", *system.ground.kind.letters), rows))
-    return Chapter("mechanism", ("The mechanism",), tuple(blocks))
+    blocks.append(doc.table(("body", *system.ground.kind.letters), rows))
+    return doc.Chapter("mechanism", ("The mechanism",), tuple(blocks))
 
 
 def _is_in_space(system: ConstraintSystem) -> bool:
     return len(system.ground.kind.axes) == len("xyz")
 
 
-def _symbol(blank: Blank, system: ConstraintSystem) -> Formula:
+def _symbol(blank: Blank, system: ConstraintSystem) -> fm.Formula:
     """Return the symbol of an entry: the derivative of its Phi, or its gamma."""
     equation = system.equations[blank.row]
     if blank.column is None:
-        return Glyph("gamma", equation, bold=False)
+        return fm.Glyph("gamma", equation, bold=False)
     name = system.coordinates[blank.column].name
-    return DerivativeSymbol(Glyph("Phi", equation, bold=False), Symbol(name))
+    return fm.DerivativeSymbol(fm.Glyph("Phi", equation, bold=False), Symbol(name))
 
 
-def _tasks(system: ConstraintSystem, blanks: Sequence[Blank]) -> Chapter:
+def _tasks(system: ConstraintSystem, blanks: Sequence[Blank]) -> doc.Chapter:
     last = system.bodies[0].coordinates[-1]
     way = "Euler parameters" if _is_in_space(system) else "sines and cosines"
-    note = text(
+    note = doc.text(
         f"Derive each entry in {way}, with the numbers of this page and the names of "
-        "the coordinates; the rate of ", Verbatim(last), " is ", Verbatim(rate(last)),
-        ". With ", Math(Equated((Joined((Glyph("Phi", "q"), Glyph("q", dots=2))), Glyph("gamma")))),
+        "the coordinates; the rate of ", doc.Verbatim(last), " is ", doc.Verbatim(rate(last)),
+        ". With ", doc.Math(fm.Equated((fm.Joined((fm.PHI_Q, fm.Q_DDOT)), fm.GAMMA))),
         ", gamma is what stands on the right side of the acceleration equation.",
     )  # fmt: skip
-    rows: list[tuple[Run | Runs, ...]] = [
-        (Verbatim(item.name), Math(_symbol(item, system)), LINE) for item in blanks
+    rows: list[tuple[doc.Run | doc.Runs, ...]] = [
+        (doc.Verbatim(item.name), doc.Math(_symbol(item, system)), LINE) for item in blanks
     ]
-    shown = table(("blank", "entry", "formula"), rows)
-    return Chapter("tasks", ("The blanks",), (note, shown))
+    shown = doc.table(("blank", "entry", "formula"), rows)
+    return doc.Chapter("tasks", ("The blanks",), (note, shown))
 
 
 def _hints(
-    system: ConstraintSystem, blanks: Sequence[Blank], chapters: Sequence[Chapter]
-) -> Chapter:
+    system: ConstraintSystem, blanks: Sequence[Blank], chapters: Sequence[doc.Chapter]
+) -> doc.Chapter:
     """Return three hints for each constraint and quantity that has a blank, folded away."""
-    found: list[Chapter] = []
+    found: list[doc.Chapter] = []
     for chapter, constraint in zip(chapters, system.constraints, strict=True):
         for quantity in ("Phi_q", "gamma"):
             own = [x for x in blanks if (x.constraint, x.quantity) == (constraint.name, quantity)]
@@ -149,19 +131,19 @@ def _hints(
             steps = [*_three(quantity, constraint, chapter)]
             anchor = f"hints-{constraint.name}-{quantity}"
             hints = tuple(
-                Chapter(f"{anchor}-{k}", (f"Hint {k}: {title}",), blocks, is_folded=True)
+                doc.Chapter(f"{anchor}-{k}", (f"Hint {k}: {title}",), blocks, is_folded=True)
                 for k, (title, blocks) in enumerate(steps, 1)
             )
             names = ", ".join(item.name for item in own)
-            title: Runs = (f"{names}: {quantity} of ", Verbatim(constraint.name))
-            found.append(Chapter(anchor, title, (), hints))
-    note = text("Each leads a little further. Try without them first.")
-    return Chapter("hints", ("Hints in three steps",), (note,), tuple(found))
+            title: doc.Runs = (f"{names}: {quantity} of ", doc.Verbatim(constraint.name))
+            found.append(doc.Chapter(anchor, title, (), hints))
+    note = doc.text("Each leads a little further. Try without them first.")
+    return doc.Chapter("hints", ("Hints in three steps",), (note,), tuple(found))
 
 
 def _three(
-    quantity: str, joint: Joint, chapter: Chapter
-) -> Iterator[tuple[str, tuple[Block, ...]]]:
+    quantity: str, joint: Joint, chapter: doc.Chapter
+) -> Iterator[tuple[str, tuple[doc.Block, ...]]]:
     """Yield three hints: the way, the vectors, what is left to write out."""
     if quantity == "Phi_q":
         yield "the rules", chapter.sections[RULE_STEP].blocks
@@ -169,40 +151,44 @@ def _three(
         yield "the matrices", tuple(_matrices(joint))
         return
     blocks = chapter.sections[GAMMA_STEP].blocks
-    displays = [item for item in blocks if isinstance(item, Display)]
-    firsts = [item.formula.parts[0] for item in displays if isinstance(item.formula, Equated)]
-    way = tuple(item for item, left in zip(displays, firsts, strict=True) if left == VELOCITY_TERM)
+    displays = [item for item in blocks if isinstance(item, doc.Display)]
+    firsts = [item.formula.parts[0] for item in displays if isinstance(item.formula, fm.Equated)]
+    way = tuple(
+        item for item, left in zip(displays, firsts, strict=True) if left == fm.VELOCITY_TERM
+    )
     yield "differentiate this along the motion, and change the sign", way
     found = {left: item for item, left in zip(displays, firsts, strict=True) if _is_gamma(left)}
     yield "the result in vectors", tuple(found.values())
     yield "the matrices", tuple(_matrices(joint))
 
 
-def _is_gamma(formula: Formula) -> bool:
-    return isinstance(formula, Glyph) and formula.letter == "gamma"
+def _is_gamma(formula: fm.Formula) -> bool:
+    return isinstance(formula, fm.Glyph) and formula.letter == "gamma"
 
 
-def _matrices(joint: Joint) -> Iterator[Block]:
+def _matrices(joint: Joint) -> Iterator[doc.Block]:
     """Yield A and B of each body that moves, in sines and cosines; in space A by entries."""
     for frame, body in zip(joint.template.frames, joint.bodies, strict=True):
         if body.is_ground:
-            yield text(f"Body {frame.index} is the ground: A is the identity, and its rates are 0.")
+            yield doc.text(
+                f"Body {frame.index} is the ground: A is the identity, and its rates are 0."
+            )
             continue
         if len(body.kind.axes) == len("xyz"):
             p = tuple(map(sympy.Symbol, body.coordinates[3:]))
             entries = EulerRotation(VectorSymbol("p", 4)).entries((p,), lambda _, value: value)
             turned = tuple(entries[k : k + 3] for k in (0, 3, 6))
-            yield Display(Equated((Glyph("A", frame.index), Matrix(turned))))
+            yield doc.Display(fm.Equated((fm.Glyph("A", frame.index), fm.Matrix(turned))))
             continue
         angle = Symbol(str(sympy.sympify(body.phi)))
-        cosine, sine = (Call(name, (angle,)) for name in ("cos", "sin"))
+        cosine, sine = (fm.Call(name, (angle,)) for name in ("cos", "sin"))
         minus_cosine, minus_sine = (_minus(item) for item in (cosine, sine))
         for letter, rows in (
             ("A", ((cosine, minus_sine), (sine, cosine))),
             ("B", ((minus_sine, minus_cosine), (cosine, minus_sine))),
         ):
-            yield Display(Equated((Glyph(letter, frame.index), Matrix(rows))))
+            yield doc.Display(fm.Equated((fm.Glyph(letter, frame.index), fm.Matrix(rows))))
 
 
-def _minus(formula: Call) -> Formula:
-    return Joined(("-", formula))
+def _minus(formula: fm.Call) -> fm.Formula:
+    return fm.Joined(("-", formula))

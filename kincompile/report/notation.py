@@ -14,21 +14,7 @@ from typing import TYPE_CHECKING, Any
 from kincompile.calculus import expressions as ex
 from kincompile.calculus.space import EulerRotation
 from kincompile.derive.collected import is_rate
-from kincompile.report.formulas import (
-    Call,
-    Choice,
-    Decimal,
-    DerivativeSymbol,
-    Equated,
-    Glyph,
-    Joined,
-    Matrix,
-    Quotient,
-    Relation,
-    Sub,
-    Transposed,
-    size,
-)
+from kincompile.report import formulas as fm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -86,7 +72,7 @@ class Notation:
         Vectors and angles that are printed as one symbol, such as d.
     """
 
-    abbreviations: Mapping[Any, Glyph]
+    abbreviations: Mapping[Any, fm.Glyph]
 
     def _row(self, parts: Sequence[Printed]) -> Printed: ...
     def _letter(self, name: str, *, bold: bool = False) -> Printed: ...
@@ -223,7 +209,7 @@ class Notation:
     def _print_Dot(self, expr: ex.Dot) -> Printed:
         return self._row([self._transposed(expr.left), self._factor(expr.right)])
 
-    def _print_Transposed(self, expr: Transposed) -> Printed:
+    def _print_Transposed(self, expr: fm.Transposed) -> Printed:
         if isinstance(expr.vector, ex.VectorSum) and any(map(_is_slope, expr.vector.terms)):
             return self._row_of(expr.vector.terms)
         if _is_slope(expr.vector):
@@ -239,7 +225,7 @@ class Notation:
             is_negative, magnitude = _signed(term)
             if is_negative or parts:
                 parts.append(self._operator("-" if is_negative else "+"))
-            parts.append(self._print(Transposed(magnitude)))
+            parts.append(self._print(fm.Transposed(magnitude)))
         return self._row(parts)
 
     def _transposed(self, vector: Any) -> Printed:
@@ -256,7 +242,9 @@ class Notation:
     def _is_atom(self, expr: Any) -> bool:
         """Return whether something needs no brackets under an exponent."""
         is_unit = isinstance(expr, ex.Perpendicular) and isinstance(expr.vector, ex.Basis)
-        atoms = ex.Symbol | ex.VectorSymbol | ex.TimeFunction | ex.Basis | Call | ex.ProfileFunction
+        atoms = (
+            ex.Symbol | ex.VectorSymbol | ex.TimeFunction | ex.Basis | fm.Call | ex.ProfileFunction
+        )
         return is_unit or isinstance(expr, atoms) or expr in self.abbreviations
 
     def _short(self, expr: Any) -> Printed:
@@ -279,7 +267,7 @@ class Notation:
         top, bottom = self._numeral(str(value.numerator)), self._numeral(str(value.denominator))
         return top if value.denominator == 1 else self._fraction(top, bottom)
 
-    def _print_Decimal(self, expr: Decimal) -> Printed:
+    def _print_Decimal(self, expr: fm.Decimal) -> Printed:
         text = f"{expr.value + 0.0:.{expr.digits}g}"
         mantissa, _, exponent = text.lstrip("-").partition("e")
         parts = [self._operator("-")] if text.startswith("-") else []
@@ -328,7 +316,7 @@ class Notation:
         if not below:
             return self._juxtaposed(above)
         divisor = self._juxtaposed(below)
-        if size(tuple(above)) <= LONGEST_NUMERATOR:
+        if fm.size(tuple(above)) <= LONGEST_NUMERATOR:
             return self._fraction(self._juxtaposed(above), divisor)
         inverse = self._fraction(self._numeral("1"), divisor)
         return self._row([inverse, self._thin_space(), *(self._factor(item) for item in above)])
@@ -340,7 +328,7 @@ class Notation:
             return self._short(factors[0])
         parts: list[Printed] = []
         for k, item in enumerate(factors):
-            if k and isinstance(item, ex.Number | Decimal):
+            if k and isinstance(item, ex.Number | fm.Decimal):
                 parts.append(self._operator("\N{DOT OPERATOR}"))
             elif k:
                 parts.append(self._thin_space())
@@ -349,15 +337,15 @@ class Notation:
 
     def _print_Power(self, expr: Any) -> Printed:
         base, exponent = expr.base, str(expr.exponent).replace("-", "\N{MINUS SIGN}")
-        if isinstance(base, Call) and base.function != "sqrt":
+        if isinstance(base, fm.Call) and base.function != "sqrt":
             head = self._scripts(self._function(base.function), None, self._numeral(exponent))
             return self._row([head, self._arguments(base)])
         return self._raised(base, self._numeral(exponent))
 
-    def _print_Quotient(self, expr: Quotient) -> Printed:
+    def _print_Quotient(self, expr: fm.Quotient) -> Printed:
         return self._fraction(self._print(expr.numerator), self._print(expr.denominator))
 
-    def _print_Call(self, expr: Call) -> Printed:
+    def _print_Call(self, expr: fm.Call) -> Printed:
         if expr.function == "sqrt":
             return self._root(self._print(expr.arguments[0]))
         if expr.function == "pow":
@@ -365,7 +353,7 @@ class Notation:
             return self._scripts(self._fenced(self._print(base)), None, self._print(exponent))
         return self._row([self._function(expr.function), self._arguments(expr)])
 
-    def _arguments(self, expr: Call) -> Printed:
+    def _arguments(self, expr: fm.Call) -> Printed:
         simple = len(expr.arguments) == 1 and isinstance(expr.arguments[0], ex.Symbol)
         if simple and expr.function in ("sin", "cos", "tan"):
             return self._print(expr.arguments[0])
@@ -388,25 +376,25 @@ class Notation:
         """Return something with as many primes as it is differentiated."""
         return self._scripts(base, index, self._operator("\N{PRIME}" * order) if order else None)
 
-    def _print_Choice(self, expr: Choice) -> Printed:
+    def _print_Choice(self, expr: fm.Choice) -> Printed:
         rows = [
             [self._print(expr.first), self._print(expr.condition)],
             [self._print(expr.second), self._function("otherwise")],
         ]
         return self._array(rows)
 
-    def _print_Relation(self, expr: Relation) -> Printed:
+    def _print_Relation(self, expr: fm.Relation) -> Printed:
         relation = self._operator(CONNECTIVES.get(expr.relation, expr.relation))
         return self._row([self._print(expr.left), relation, self._print(expr.right)])
 
-    def _print_Glyph(self, expr: Glyph) -> Printed:
+    def _print_Glyph(self, expr: fm.Glyph) -> Printed:
         base = self._letter(expr.letter, bold=expr.bold)
         base = self._dotted(base, expr.dots) if expr.dots else base
         index = self._index_text(expr.index) if expr.index else None
         exponent = self._index_text(expr.exponent) if expr.exponent else None
         return self._scripts(base, index, exponent)
 
-    def _print_Joined(self, expr: Joined) -> Printed:
+    def _print_Joined(self, expr: fm.Joined) -> Printed:
         return self._row([self._part(part) for part in expr.parts])
 
     def _part(self, part: Any) -> Printed:
@@ -416,14 +404,14 @@ class Notation:
             return self._numeral(part)
         return self._function(part) if part.isalpha() else self._operator(part)
 
-    def _print_Sub(self, expr: Sub) -> Printed:
+    def _print_Sub(self, expr: fm.Sub) -> Printed:
         index = self._print(expr.index)
-        if isinstance(expr.base, Glyph) and expr.base.exponent and not expr.base.index:
+        if isinstance(expr.base, fm.Glyph) and expr.base.exponent and not expr.base.index:
             bare = self._print(replace(expr.base, exponent=""))
             return self._scripts(bare, index, self._index_text(expr.base.exponent))
         return self._scripts(self._print(expr.base), index, None)
 
-    def _print_DerivativeSymbol(self, expr: DerivativeSymbol) -> Printed:
+    def _print_DerivativeSymbol(self, expr: fm.DerivativeSymbol) -> Printed:
         top = self._row([self._sign(expr.sign), self._print(expr.numerator)])
         return self._fraction(
             top, self._row([self._sign(expr.sign), self._print(expr.denominator)])
@@ -432,12 +420,12 @@ class Notation:
     def _sign(self, sign: str) -> Printed:
         return self._letter("d") if sign == "d" else self._operator(sign)
 
-    def _print_Equated(self, expr: Equated) -> Printed:
+    def _print_Equated(self, expr: fm.Equated) -> Printed:
         return self._joined("=", expr.parts)
 
     def pieces(self, formula: Any) -> list[Printed]:
         """Return a formula in pieces between which a line may be broken: at = and at + and -."""
-        if not isinstance(formula, Equated):
+        if not isinstance(formula, fm.Equated):
             return [self._print(formula)]
         pieces: list[Printed] = []
         for k, part in enumerate(formula.parts):
@@ -461,7 +449,7 @@ class Notation:
             found.append((sign, self._factor(magnitude)))
         return found
 
-    def _print_Matrix(self, expr: Matrix) -> Printed:
+    def _print_Matrix(self, expr: fm.Matrix) -> Printed:
         return self._array([[self._short(cell) for cell in row] for row in expr.rows])
 
 
@@ -474,8 +462,8 @@ def _signed(term: Any) -> tuple[bool, Any]:
     match term:
         case ex.Number(value) if value < 0:
             return True, ex.Number(-value)
-        case Decimal(value, digits) if value < 0:
-            return True, Decimal(-value, digits)
+        case fm.Decimal(value, digits) if value < 0:
+            return True, fm.Decimal(-value, digits)
         case ex.Product((ex.Number(value), *rest)) if value < 0:
             factors = rest if value == -1 else [ex.Number(-value), *rest]
             return True, factors[0] if len(factors) == 1 else ex.Product(tuple(factors))
@@ -491,6 +479,6 @@ def _is_reciprocal(factor: Any) -> bool:
 
 def _place(factor: Any) -> int:
     """Return where a factor stands: numbers first, rates last."""
-    if isinstance(factor, ex.Number | Decimal):
+    if isinstance(factor, ex.Number | fm.Decimal):
         return 0
     return 2 if is_rate(factor) else 1

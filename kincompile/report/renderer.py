@@ -5,22 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
-from kincompile.report.document import (
-    CrossReference,
-    Display,
-    Figure,
-    Math,
-    NotebookCode,
-    Pattern,
-    Table,
-    Text,
-    Verbatim,
-)
+from kincompile.report import document as doc
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from kincompile.report.document import Block, Chapter, Run, Runs
     from kincompile.report.formulas import Formula
     from kincompile.report.picture import Picture
 
@@ -28,7 +17,7 @@ if TYPE_CHECKING:
 class Renderer(ABC):
     """Prints sections line by line; a medium gives the methods below `run`."""
 
-    def section(self, section: Chapter, depth: int) -> Iterator[str]:
+    def section(self, section: doc.Chapter, depth: int) -> Iterator[str]:
         """Yield the lines of a section and its parts; `depth` counts from 0."""
         yield from self.heading(section, depth)
         for block in section.blocks:
@@ -36,53 +25,53 @@ class Renderer(ABC):
         for inner in section.sections:
             yield from self.section(inner, depth + 1)
 
-    def block(self, block: Block) -> Iterable[str]:
+    def block(self, block: doc.Block) -> Iterable[str]:
         """Return the lines of a block; only notebooks have code."""
         match block:
-            case Text(runs):
+            case doc.Text(runs):
                 return self._paragraph(self.runs(runs))
-            case Display():
+            case doc.Display():
                 return self._display(block)
-            case Table():
+            case doc.Table():
                 return self._table(block)
-            case Pattern():
+            case doc.Pattern():
                 return self._pattern(block)
-            case Figure(picture):
+            case doc.Figure(picture):
                 return self._figure(picture)
-            case NotebookCode():
+            case doc.NotebookCode():
                 return ()
         raise TypeError(f"cannot print {block!r}")
 
-    def runs(self, runs: Runs) -> str:
+    def runs(self, runs: doc.Runs) -> str:
         """Return a text."""
         return "".join(map(self.run, runs))
 
-    def run(self, run: Run) -> str:
+    def run(self, run: doc.Run) -> str:
         """Return a piece of a text."""
         match run:
-            case Verbatim(text):
+            case doc.Verbatim(text):
                 return self._verbatim(text)
-            case Math(formula):
+            case doc.Math(formula):
                 return self._math(formula)
-            case CrossReference():
+            case doc.CrossReference():
                 return self._link(run)
         return self._prose(run)
 
     @abstractmethod
-    def heading(self, section: Chapter, depth: int) -> Iterator[str]:
+    def heading(self, section: doc.Chapter, depth: int) -> Iterator[str]:
         """Yield the title of a section."""
 
     @abstractmethod
     def _paragraph(self, text: str) -> Iterable[str]: ...
 
     @abstractmethod
-    def _display(self, block: Display) -> Iterator[str]: ...
+    def _display(self, block: doc.Display) -> Iterator[str]: ...
 
     @abstractmethod
-    def _table(self, table: Table) -> Iterator[str]: ...
+    def _table(self, table: doc.Table) -> Iterator[str]: ...
 
     @abstractmethod
-    def _pattern(self, pattern: Pattern) -> Iterator[str]: ...
+    def _pattern(self, pattern: doc.Pattern) -> Iterator[str]: ...
 
     @abstractmethod
     def _figure(self, picture: Picture) -> Iterable[str]: ...
@@ -94,7 +83,7 @@ class Renderer(ABC):
     def _math(self, formula: Formula) -> str: ...
 
     @abstractmethod
-    def _link(self, link: CrossReference) -> str: ...
+    def _link(self, link: doc.CrossReference) -> str: ...
 
     @abstractmethod
     def _prose(self, text: str) -> str: ...

@@ -14,15 +14,7 @@ from kincompile.report.templates import fill, read
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from kincompile.report.document import (
-        Chapter,
-        CrossReference,
-        Display,
-        Manuscript,
-        Pattern,
-        SourceLine,
-        Table,
-    )
+    from kincompile.report import document as doc
     from kincompile.report.formulas import Formula
     from kincompile.report.picture import Picture
 
@@ -37,7 +29,7 @@ CHARACTER = 6.8
 
 
 def as_html(
-    document: Manuscript, title: str = "Derivation of", kind: str = "", after: str = ""
+    document: doc.Manuscript, title: str = "Derivation of", kind: str = "", after: str = ""
 ) -> str:
     """Return a document as an HTML page; the title stands before its name.
 
@@ -60,10 +52,10 @@ def as_html(
 
 
 class _HtmlRenderer(Renderer):
-    def __init__(self, document: Manuscript) -> None:
+    def __init__(self, document: doc.Manuscript) -> None:
         self._printer = MathMLPrinter(document.abbreviations)
 
-    def contents(self, sections: tuple[Chapter, ...], depth: int = 1) -> Iterator[str]:
+    def contents(self, sections: tuple[doc.Chapter, ...], depth: int = 1) -> Iterator[str]:
         yield "<ol>"
         for item in sections:
             yield f'<li><a href="#{escape(item.anchor)}">{self.runs(item.title)}</a>'
@@ -72,11 +64,11 @@ class _HtmlRenderer(Renderer):
             yield "</li>"
         yield "</ol>"
 
-    def section(self, section: Chapter, depth: int) -> Iterator[str]:
+    def section(self, section: doc.Chapter, depth: int) -> Iterator[str]:
         yield from super().section(section, depth)
         yield "</details></section>" if section.is_folded else "</section>"
 
-    def heading(self, section: Chapter, depth: int) -> Iterator[str]:
+    def heading(self, section: doc.Chapter, depth: int) -> Iterator[str]:
         level = f'<span class="level {section.level}">{section.level}</span>'
         title = self.runs(section.title) + (level if section.level else "")
         heading = f"<h{depth + 2}>{title}</h{depth + 2}>"
@@ -86,13 +78,13 @@ class _HtmlRenderer(Renderer):
     def _paragraph(self, text: str) -> Iterator[str]:
         yield f"<p>{text}</p>"
 
-    def _display(self, block: Display) -> Iterator[str]:
+    def _display(self, block: doc.Display) -> Iterator[str]:
         anchor = f' id="{escape(block.anchor)}"' if block.anchor else ""
         yield f'<div class="eq wide"{anchor}>{self._printer.display(block.formula)}</div>'
         if block.source is not None:
             yield _source(block.source)
 
-    def _table(self, table: Table) -> Iterator[str]:
+    def _table(self, table: doc.Table) -> Iterator[str]:
         if table.folded:
             yield f"<details><summary>{escape(table.folded)}</summary>"
         header = "".join(f"<th>{self.runs(cell)}</th>" for cell in table.header)
@@ -104,7 +96,7 @@ class _HtmlRenderer(Renderer):
         if table.folded:
             yield "</details>"
 
-    def _pattern(self, pattern: Pattern) -> Iterator[str]:
+    def _pattern(self, pattern: doc.Pattern) -> Iterator[str]:
         yield from ('<div class="wide">', _pattern_svg(pattern), "</div>")
 
     def _figure(self, picture: Picture) -> Iterator[str]:
@@ -116,14 +108,14 @@ class _HtmlRenderer(Renderer):
     def _math(self, formula: Formula) -> str:
         return self._printer.math(formula)
 
-    def _link(self, link: CrossReference) -> str:
+    def _link(self, link: doc.CrossReference) -> str:
         return f'<a href="#{escape(link.anchor)}">{self.run(link.content)}</a>'
 
     def _prose(self, text: str) -> str:
         return escape(text)
 
 
-def _source(source: SourceLine) -> str:
+def _source(source: doc.SourceLine) -> str:
     *before, last = source.text.split("\n")
     shown = f"line {source.number}: <code>{escape(last)}</code>"
     if not before:
@@ -132,7 +124,7 @@ def _source(source: SourceLine) -> str:
     return f'<details class="src"><summary>{shown}</summary><pre>{code}</pre></details>'
 
 
-def _pattern_svg(pattern: Pattern) -> str:
+def _pattern_svg(pattern: doc.Pattern) -> str:
     """Return a picture; a filled square is an entry that can differ from zero, and a link."""
     left = 10 + CHARACTER * max(map(len, pattern.rows), default=0)
     top = 10 + CHARACTER * max(map(len, pattern.columns), default=0)
@@ -166,7 +158,7 @@ def _pattern_svg(pattern: Pattern) -> str:
     )  # fmt: skip
 
 
-def _cell(pattern: Pattern, row: int, column: int, left: float, top: float) -> str:
+def _cell(pattern: doc.Pattern, row: int, column: int, left: float, top: float) -> str:
     title = f"<title>{escape(pattern.rows[row])} by {escape(pattern.columns[column])}</title>"
     return element(
         "rect", title, class_="entry", x=f"{left + CELL * column + 2:.0f}",

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from kincompile.report.document import Math
+from kincompile.report import document as doc
 from kincompile.report.figure import svg_address
 from kincompile.report.renderer import Renderer
 from kincompile.report.tex import TexPrinter
@@ -17,14 +17,6 @@ from kincompile.report.tex import TexPrinter
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from kincompile.report.document import (
-        Chapter,
-        CrossReference,
-        Display,
-        Manuscript,
-        Pattern,
-        Table,
-    )
     from kincompile.report.formulas import Formula
     from kincompile.report.picture import Picture
 
@@ -44,7 +36,7 @@ GITHUB = FormulaMarks("```math", "```", "$`{}`$")
 NOTEBOOK = FormulaMarks("$$", "$$", "${}$")
 
 
-def as_markdown(document: Manuscript) -> str:
+def as_markdown(document: doc.Manuscript) -> str:
     """Return a document as Markdown for GitHub."""
     renderer = MarkdownRenderer(document, GITHUB)
     lines = [f"# Derivation of `{document.name}`", "", escape(document.summary), ""]
@@ -61,11 +53,11 @@ def escape(text: str) -> str:
 class MarkdownRenderer(Renderer):
     """Prints Markdown in a dialect."""
 
-    def __init__(self, document: Manuscript, dialect: FormulaMarks) -> None:
+    def __init__(self, document: doc.Manuscript, dialect: FormulaMarks) -> None:
         self._printer = TexPrinter(document.abbreviations)
         self._dialect = dialect
 
-    def heading(self, section: Chapter, depth: int) -> Iterator[str]:
+    def heading(self, section: doc.Chapter, depth: int) -> Iterator[str]:
         """Yield the title of a section, after its anchor."""
         level = f" *({section.level})*" if section.level else ""
         title = f"{'#' * (depth + 2)} {self.runs(section.title)}{level}"
@@ -74,7 +66,7 @@ class MarkdownRenderer(Renderer):
     def _paragraph(self, text: str) -> Iterator[str]:
         yield from (text, "")
 
-    def _display(self, block: Display) -> Iterator[str]:
+    def _display(self, block: doc.Display) -> Iterator[str]:
         if block.anchor:
             yield from (_anchor(block.anchor), "")
         pieces = " ".join(self._printer.pieces(block.formula))
@@ -83,7 +75,7 @@ class MarkdownRenderer(Renderer):
             yield from (f"Line {block.source.number} of the emitted module:", "")
             yield from ("```python", block.source.text, "```", "")
 
-    def _table(self, table: Table) -> Iterator[str]:
+    def _table(self, table: doc.Table) -> Iterator[str]:
         if table.folded:
             yield from (f"{escape(table.folded)}:", "")
         yield _line(map(self.runs, table.header))
@@ -91,7 +83,7 @@ class MarkdownRenderer(Renderer):
         yield from (_line(map(self.runs, row)) for row in table.rows)
         yield ""
 
-    def _pattern(self, pattern: Pattern) -> Iterator[str]:
+    def _pattern(self, pattern: doc.Pattern) -> Iterator[str]:
         yield _line(["", *(f"`{name}`" for name in pattern.columns)])
         yield _line(["---", *([":-:"] * len(pattern.columns))])
         for row, name in enumerate(pattern.rows):
@@ -111,9 +103,9 @@ class MarkdownRenderer(Renderer):
     def _math(self, formula: Formula) -> str:
         return self._dialect.inline.format(self._printer.math(formula))
 
-    def _link(self, link: CrossReference) -> str:
+    def _link(self, link: doc.CrossReference) -> str:
         content = self.run(link.content)
-        if isinstance(link.content, Math):
+        if isinstance(link.content, doc.Math):
             # A formula inside the brackets of a link is not understood everywhere.
             return f"{content} [\N{DOWNWARDS ARROW}](#{link.anchor})"
         return f"[{content}](#{link.anchor})"
