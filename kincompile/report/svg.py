@@ -17,6 +17,7 @@ def element(tag: str, inside: str = "", **attributes: object) -> str:
     """Return an element with what is inside it; an attribute that is "" is left out.
 
     A name is written as in Python: ``stroke_width`` for ``stroke-width``, ``class_`` for ``class``.
+    Inside and values come escaped, but for quotes; `label` escapes its text.
     """
     given = ""
     for name, value in attributes.items():
