@@ -6,7 +6,9 @@ from base64 import b64encode
 from functools import singledispatch
 from html import escape
 from io import BytesIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
+
+from kincompile.tables import indented, table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -50,6 +52,38 @@ class Shown:
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(self.to_text())}</pre>"
+
+
+class Tabled(Shown):
+    """A value whose report is a table, under its headline and with remarks below.
+
+    A subclass says its rows and `name`, with which the headline begins.
+
+    `header` has the titles of the columns, `numbers` those of numbers, aligned to the right.
+    """
+
+    __slots__ = ()
+
+    header: ClassVar[tuple[str, ...]]
+    numbers: ClassVar[tuple[str, ...]]
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return the cells of the table as text."""
+        raise NotImplementedError
+
+    def remarks(self) -> list[str]:
+        """Return the lines below the table."""
+        return []
+
+    def to_text(self) -> str:
+        """Return the headline, the table and the remarks."""
+        lines = table(self.header, self.rows(), self.numbers)
+        return "\n".join([self.headline(), *indented(lines), *self.remarks()])
+
+    def _repr_html_(self) -> str:
+        name, _, title = self.headline().partition(": ")
+        remarks = "".join(f"<p>{escape(line)}</p>" for line in self.remarks())
+        return table_html(name, title, self.header, self.rows()) + remarks
 
 
 def table_html(name: str, title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -8,16 +8,8 @@ import click
 import numpy as np
 
 import kincompile as kc
+from kincompile.cli import shared
 from kincompile.cli.motion import set_values
-from kincompile.cli.shared import (
-    deg_option,
-    end_unsolved,
-    output_option,
-    print_data,
-    read_model,
-    require_page,
-    set_option,
-)
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.tables import table
 
@@ -35,9 +27,9 @@ ROUNDING = 1e-9
 @click.command("assemblies")
 @click.argument("model")
 @click.option("--time", "at", type=float, default=0.0, metavar="T", help="Time of the assemblies.")
-@set_option("parameter")
-@deg_option("List angles in degrees.")
-@output_option("Page to write, .html: each assembly and the motion from it.", required=False)
+@shared.set_option("parameter")
+@shared.deg_option("List angles in degrees.")
+@shared.output_option("Page to write, .html: each assembly and the motion from it.", required=False)
 @click.pass_context
 def command(
     context: click.Context,
@@ -54,8 +46,8 @@ def command(
     there is none.
     """
     if output is not None:
-        require_page(output)
-    read = read_model(model)
+        shared.require_page(output)
+    read = shared.read_model(model)
     numbers = set_values(read, values)
     if output is None:
         module = kc.compile(read)
@@ -64,8 +56,8 @@ def command(
         drawn = kc.assembly_gallery(read, at, numbers)
         module, found = drawn.module, drawn.positions
     if not len(found):
-        end_unsolved(context, f"{module.NAME} cannot be assembled at t = {at:g}")
-    print_data("\n".join(_listed(module, found, at, angle_unit)) + "\n")
+        shared.end_unsolved(context, f"{module.NAME} cannot be assembled at t = {at:g}")
+    shared.print_data("\n".join(_listed(module, found, at, angle_unit)) + "\n")
     if output is not None:
         click.echo(f"Wrote {drawn.write(output)}", err=True)
 

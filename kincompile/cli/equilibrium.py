@@ -8,15 +8,8 @@ import click
 import numpy as np
 
 import kincompile as kc
+from kincompile.cli import shared
 from kincompile.cli.motion import set_values
-from kincompile.cli.shared import (
-    end_unsolved,
-    output_option,
-    print_data,
-    read_model,
-    require_output,
-    set_option,
-)
 from kincompile.errors import InputError
 from kincompile.runtime.results.summary import without_noise
 from kincompile.tables import table
@@ -30,8 +23,10 @@ if TYPE_CHECKING:
 @click.argument("model")
 @click.option("--time", "at", type=float, default=0.0, metavar="T", help="Time of the loads.")
 @click.option("--all", "is_all", is_flag=True, help="All equilibria, unstable ones too.")
-@set_option("parameter")
-@output_option("File to write, .csv, .npz or .json: position, outputs, reactions.", required=False)
+@shared.set_option("parameter")
+@shared.output_option(
+    "File to write, .csv, .npz or .json: position, outputs, reactions.", required=False
+)
 @click.pass_context
 def command(
     context: click.Context,
@@ -47,10 +42,10 @@ def command(
     is none.
     """
     if output is not None:
-        require_output(output, model, "the model")
+        shared.require_output(output, model, "the model")
         if is_all:
             raise InputError("--all lists equilibria; -o writes one: leave one of them out")
-    read = read_model(model)
+    read = shared.read_model(model)
     numbers, module = set_values(read, values), kc.compile(read)
     if is_all:
         found = kc.equilibria(module, at, numbers)
@@ -59,8 +54,8 @@ def command(
         one = kc.equilibrium(module, at, numbers)
         found, message = [one] if one.success else [], one.message
     if not found:
-        end_unsolved(context, message)
-    print_data("\n".join(_listed(module, found, at)) + "\n")
+        shared.end_unsolved(context, message)
+    shared.print_data("\n".join(_listed(module, found, at)) + "\n")
     if output is not None:
         click.echo(f"Wrote {kc.write(found[0].forces.motion, output)}", err=True)
 

@@ -8,15 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import kincompile as kc
+from kincompile.cli import shared
 from kincompile.cli.motion import Motion, motion_options, sweep_options
 from kincompile.cli.progress import progress_bar
-from kincompile.cli.shared import (
-    deg_option,
-    give_motion,
-    output_option,
-    read_model,
-    require_output,
-)
 from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.runtime.results.summary import summary
@@ -32,9 +26,9 @@ if TYPE_CHECKING:
 @motion_options
 @sweep_options
 @click.option("--analysis", metavar="FILE", help="Take end and points from an .acf file.")
-@deg_option("Show and write angles in degrees.")
+@shared.deg_option("Show and write angles in degrees.")
 @click.option("--forces", "has_forces", is_flag=True, help="Reactions and drivers' torques too.")
-@output_option("Write the motion: .csv, .npz or .json.", required=False)
+@shared.output_option("Write the motion: .csv, .npz or .json.", required=False)
 @click.pass_context
 def command(
     context: click.Context,
@@ -56,8 +50,8 @@ def command(
     """
     if output is not None:
         require_known_suffix(output)
-        require_output(output, model, "the model itself")
-    mechanism = read_model(model)
+        shared.require_output(output, model, "the model itself")
+    mechanism = shared.read_model(model)
     if analysis is not None:
         settings = kc.read_analysis(analysis)
         motion = replace(
@@ -75,4 +69,6 @@ def command(
         solution = kc.solve(
             module, times, numbers | sweeps, product=product, progress=progress, **options
         )
-    give_motion(context, solution, summary(solution, angle_unit), output, angle_unit, has_forces)
+    shared.give_motion(
+        context, solution, summary(solution, angle_unit), output, angle_unit, has_forces
+    )

@@ -5,15 +5,9 @@ from __future__ import annotations
 import click
 
 import kincompile as kc
+from kincompile.cli import shared
 from kincompile.cli.motion import Motion, set_values, time_options
 from kincompile.cli.progress import progress_bar
-from kincompile.cli.shared import (
-    deg_option,
-    give_motion,
-    output_option,
-    read_model,
-    require_output,
-)
 from kincompile.errors import InputError
 from kincompile.runtime.dynamics.solvers import METHODS
 from kincompile.runtime.results.summary import summary
@@ -47,9 +41,9 @@ from kincompile.runtime.results.write import require_known_suffix
 @click.option("--method", type=click.Choice(METHODS), default="DOP853", help="The integrator.")
 @click.option("--rtol", type=float, default=1e-9, help="Relative tolerance of a step.")
 @click.option("--through", type=click.Choice(["smooth"]), help="Go on past singular positions.")
-@deg_option("Show and write angles in degrees.")
+@shared.deg_option("Show and write angles in degrees.")
 @click.option("--forces", "has_forces", is_flag=True, help="Reactions and drivers' torques too.")
-@output_option("Write the motion: .csv, .npz or .json.", required=False)
+@shared.output_option("Write the motion: .csv, .npz or .json.", required=False)
 @click.pass_context
 def command(
     context: click.Context,
@@ -72,8 +66,8 @@ def command(
     """  # fmt: skip
     if output is not None:
         require_known_suffix(output)
-        require_output(output, model, "the model itself")
-    mechanism = read_model(model)
+        shared.require_output(output, model, "the model itself")
+    mechanism = shared.read_model(model)
     numbers = motion.numbers(mechanism)
     times = motion.times(mechanism, numbers)
     if times.size < 2:
@@ -97,4 +91,4 @@ def command(
             progress=progress,
         )
     text = f"{summary(solution, angle_unit)}\n{solution.message}"
-    give_motion(context, solution, text, output, angle_unit, has_forces)
+    shared.give_motion(context, solution, text, output, angle_unit, has_forces)

@@ -90,6 +90,24 @@ def test_that_a_derivation_shows_itself_in_a_frame(example_named: Any) -> None:
     assert frame.attrib["srcdoc"].startswith("<!DOCTYPE html>")
 
 
+def test_that_results_over_a_motion_are_tables_in_print_and_in_a_notebook() -> None:
+    m = kc.Mechanism("pendulum")
+    length = m.parameter("L", 0.5, unit="m")
+    rod = m.body("rod", (0.5, 0, 0), mass=1.0, inertia=0.1)
+    m.add(kc.Revolute("A", m.ground, (0, 0), rod, (-length, 0)))
+    m.add(kc.AbsoluteAngle("motor", rod, kc.t))
+    m.gravity = (0, -9.81)
+    solution = kc.solve(kc.compile(m), [0.0, 0.1])
+    forces = kc.forces(solution)
+    for found in (forces, forces.measures(), kc.sensitivities(solution, "L")):
+        header, *rows = cells(found._repr_html_())
+        headline, titles, *lines = str(found).splitlines()
+        assert headline.startswith("pendulum: ")
+        assert titles.split() == " ".join(header).split()
+        assert [line.split() for line in lines] == [[x for x in row if x] for row in rows]
+        assert rows
+
+
 def test_that_everything_public_is_short_in_a_list_and_whole_in_print(example_named: Any) -> None:
     model, module = example_named("four_bar").model, example_named("four_bar").module
     folding = example_named("problem_3_5_6")

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.errors import InputError
-from kincompile.html import Shown
+from kincompile.html import Tabled
 from kincompile.names import column_name, unknown
-from kincompile.tables import indented, table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -48,8 +47,11 @@ class ForceMeasure:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class ForceMeasures(Shown):
+class ForceMeasures(Tabled):
     """Measures of forces: ``measures["motor.drive"]`` gives one; str is a table."""
+
+    header = ("force", "peak", "at t", "rms", "mean", "unit")
+    numbers = header[1:5]
 
     name: str
     items: tuple[ForceMeasure, ...]
@@ -63,15 +65,14 @@ class ForceMeasures(Shown):
             raise InputError(unknown(text, wanted, known))
         return known[wanted]
 
-    def to_text(self) -> str:
-        """Return a table."""
-        heads = ("force", "peak", "at t", "rms", "mean", "unit")
-        rows = []
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return the peak of each force, when it is reached, and means."""
+        rows: list[tuple[str, ...]] = []
         for item in self.items:
             at = item.t_greatest if item.peak == abs(item.greatest) else item.t_least
             numbers = (f"{x:.6g}" for x in (item.peak, at, item.rms, item.mean))
             rows.append((item.name, *numbers, item.unit))
-        return "\n".join([self.headline(), *indented(table(heads, rows, heads[1:5]))])
+        return rows
 
     def headline(self) -> str:
         """Return the name."""

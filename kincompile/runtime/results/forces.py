@@ -23,7 +23,6 @@ from kincompile.runtime.results.force_measures import ForceMeasures, force_measu
 from kincompile.runtime.results.observed import Points
 from kincompile.runtime.results.orientation import orientation
 from kincompile.runtime.results.solution import OfMotion, Solution, require_solution
-from kincompile.tables import indented, table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -96,6 +95,9 @@ class Forces(OfMotion):
         Names of multipliers and forces that no rigid model can know, because redundant joints
         share a load; they are NaN.
     """
+
+    header = ("force", "largest", "unit")
+    numbers = ("largest",)
 
     motion: Solution
     names: tuple[str, ...]
@@ -227,21 +229,14 @@ class Forces(OfMotion):
         """Return the table of measures, of variants that of the largest magnitudes."""
         if self.motion.q.ndim > 2 or not np.isfinite(self.multipliers).any():
             return self.to_text()
-        return "\n".join([str(self.measures()), *self._remarks()])
+        return "\n".join([str(self.measures()), *self.remarks()])
 
-    def to_text(self) -> str:
-        """Return a table: of each drive, load and reaction the largest magnitude."""
-        rows = [
-            (name, f"{largest(values):.6g}", unit)
-            for name, (values, unit) in self.columns().items()
-        ]
-        lines = [
-            self.headline(),
-            *indented(table(("force", "largest", "unit"), rows, ("largest",))),
-        ]
-        return "\n".join([*lines, *self._remarks()])
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return of each drive, load and reaction the largest magnitude."""
+        columns = self.columns().items()
+        return [(name, f"{largest(values):.6g}", unit) for name, (values, unit) in columns]
 
-    def _remarks(self) -> list[str]:
+    def remarks(self) -> list[str]:
         """Return a line on what is not determined, if anything is."""
         shared = [name for name in self.undetermined if not name.startswith("lambda_")]
         return (

@@ -19,7 +19,7 @@ import numpy as np
 
 from kincompile.criteria import AGREEMENT, SOLVED
 from kincompile.errors import InputError
-from kincompile.html import Shown
+from kincompile.html import Tabled
 from kincompile.names import (
     listed,
     parameters_problem,
@@ -33,7 +33,6 @@ from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import largest, rate_unit
 from kincompile.runtime.results.observed import Points, observed
 from kincompile.runtime.results.solution import require_solution
-from kincompile.tables import indented, table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,7 +49,7 @@ WITNESSES = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Sensitivities(Shown):
+class Sensitivities(Tabled):
     """Derivatives of a motion by k parameters, over N points of n coordinates and r outputs.
 
     ``found["phi_rod", "a"]``, ``found["rod.phi_dot", "a"]`` and the like give them by name, and
@@ -76,6 +75,9 @@ class Sensitivities(Shown):
         Second derivatives of coordinates and outputs, of their rates and second rates; NaN also
         where Phi_q is nearly singular, or the planned elimination misses its equations.
     """
+
+    header = ("column", "by", "largest", "unit")
+    numbers = ("largest",)
 
     t: Array
     q_p: Array
@@ -142,15 +144,13 @@ class Sensitivities(Shown):
         """Return the coordinate or output, and the order of the rate, that a name means."""
         return column_meant(self.name, column, self.coordinates, self.outputs)
 
-    def to_text(self) -> str:
-        """Return a table: by parameter, the largest absolute derivative of each column."""
-        rows = [
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return by parameter the largest absolute derivative of each column."""
+        return [
             (name, parameter, f"{largest(self[name, parameter]):.6g}", self.unit(name, parameter))
             for name in (*self.coordinates, *self.outputs)
             for parameter in self.parameters
         ]
-        lines = table(("column", "by", "largest", "unit"), rows, right=("largest",))
-        return "\n".join([self.headline(), *indented(lines)])
 
     def headline(self) -> str:
         """Return the name and the parameters."""

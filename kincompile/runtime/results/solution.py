@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError
-from kincompile.html import Shown, picture_html
+from kincompile.html import Tabled, picture_html
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.results.columns import MotionTable, Observed
 from kincompile.runtime.results.html import solution_html
@@ -254,7 +254,7 @@ class Solution(MotionTable):
         return f"failed, {good} of {self.status.size} points converged; see .message"
 
 
-class OfMotion(Shown):
+class OfMotion(Tabled):
     """What is known over a motion: ``found["rod.phi"]`` and the like give its columns by name."""
 
     __slots__ = ()

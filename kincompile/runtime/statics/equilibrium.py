@@ -20,7 +20,7 @@ from kincompile.runtime.statics.path import follow
 from kincompile.runtime.statics.settle import settle
 from kincompile.runtime.status import Status
 from kincompile.runtime.verdict import about
-from kincompile.tables import counted, indented, table
+from kincompile.tables import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -65,6 +65,9 @@ class Equilibrium(OfMotion):
         where none is negative, and swings grow nevertheless, with the masses and dampers that there
         are; ``"undecided"`` where an unsymmetric stiffness allows that, and a body has no mass.
     """
+
+    header = ("t", "equilibrium", "least eigenvalue")
+    numbers = (header[0], header[2])
 
     motion: Solution
     eigenvalues: Array
@@ -178,16 +181,17 @@ class Equilibrium(OfMotion):
         moved[np.ix_(is_loose, is_loose)] = np.inf
         return np.asarray(moved)
 
-    def to_text(self) -> str:
-        """Return the outcome, the times with their stability, and the critical points."""
-        heads = ("t", "equilibrium", "least eigenvalue")
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return the times with their stability."""
         least = self.eigenvalues.min(axis=1, initial=np.inf)
-        rows = [
+        return [
             (f"{t:.6g}", kind or "none", f"{value:.6g}" if kind else "")
             for t, kind, value in zip(self.t, self.stability, least, strict=True)
         ]
-        lines = [self.headline(), *indented(table(heads, rows, (heads[0], heads[2])))]
-        return "\n".join([*lines, self.message])
+
+    def remarks(self) -> list[str]:
+        """Return the outcome, and the critical points."""
+        return [self.message]
 
     def headline(self) -> str:
         """Return the name and what was found."""
