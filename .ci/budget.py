@@ -57,6 +57,22 @@ def code_lines(path: Path) -> int:
     return len({line for span in spans for line in span})
 
 
+SPACE = re.compile(
+    r"len\([^()]*\.axes\)|\b(is_spatial|_?is_in_space|in_space|words\.count|frame\.size|on_request)\b|"
+    r"\b(SPACE|PLANE|SPATIAL|PLANAR|SpatialBody|SpatialFrame|PlaneFrame)\b|'xyz'"
+)
+"""How a test asks whether it is in the plane or in space."""
+
+
+def branches_on_space(path: Path) -> int:
+    """Return how many branches of a module ask for the dimension."""
+    found = 0
+    for node in ast.walk(ast.parse(source_of(path))):
+        tests = [node.test] if isinstance(node, ast.If | ast.IfExp) else getattr(node, "ifs", [])
+        found += sum(SPACE.search(ast.unparse(test)) is not None for test in tests)
+    return found
+
+
 def import_lines(path: Path) -> int:
     """Return how many lines of a module are import statements."""
     nodes = (node for node in ast.walk(ast.parse(source_of(path))) if isinstance(node, IMPORTS))
@@ -91,6 +107,7 @@ def counted(words: Iterable[str]) -> Table:
         "package": {"code lines": code.total(), "raw lines": raw, "percent of imports": share},
         "code lines": dict(code),
         "template lines": dict(templates),
+        "branches": {"on space": sum(map(branches_on_space, modules))},
         "files that name": {word: sum(names_it(x, word) for x in modules) for word in words},
     }
 

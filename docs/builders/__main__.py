@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from docs.builders import course, joints, notebooks, pictures
+from docs.builders import course, fields, joints, notebooks, pictures
 from docs.builders.places import DOCS, write
 
 WRITERS = {
@@ -12,6 +12,7 @@ WRITERS = {
         DOCS / "images", {**joints.pictures(), **course.sketches(), **pictures.drawn()}
     ),
     "joints": lambda: write(DOCS, {"joints.md": joints.page()}),
+    "fields": lambda: write(DOCS, {fields.PAGE: fields.page()}),
     "notebooks": lambda: write(notebooks.FOLDER, notebooks.notebooks()),
     "course": lambda: course.make(sys.argv[2:]),
 }

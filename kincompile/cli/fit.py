@@ -16,9 +16,11 @@ from kincompile.cli.shared import (
     read_model,
     require_output,
     set_option,
+    table_options,
     write_page,
 )
 from kincompile.errors import InputError
+from kincompile.model.tasks import Fit
 from kincompile.writing import write_atomically
 
 ENDINGS = (".toml", ".json")
@@ -29,17 +31,16 @@ ENDINGS = (".toml", ".json")
 @output_option("Model to write with the dimensions found: .toml or .json.", required=False)
 @page_option
 @set_option("parameter")
-@click.option("--samples", type=click.IntRange(min=1), help="Sets of parameters to search.")
-@click.option("--starts", type=click.IntRange(min=1), help="How many of them are followed.")
+@table_options(Fit)
 @click.pass_context
 def command(
     context: click.Context,
+    /,
     model: str,
     output: str | None,
     page: str | None,
     values: tuple[str, ...],
-    samples: int | None,
-    starts: int | None,
+    **options: int | None,
 ) -> None:
     """Find dimensions with which MODEL reaches the targets of its table [fit].
 
@@ -56,10 +57,8 @@ def command(
             raise InputError(f"cannot write {output}: end its name in .toml or .json")
         require_output(output, model, "the model itself")
     mechanism = require_mechanism(read_model(model), "kincompile fit")
-    options = {"samples": samples, "starts": starts}
-    given = read_fit(model, mechanism) | {
-        name: value for name, value in options.items() if value is not None
-    }
+    given = read_fit(model, mechanism)
+    given |= {name: x for name, x in options.items() if x is not None}
     found = kc.fit(mechanism, p=set_values(mechanism, values), **given)
     print_data(f"{found}\n")
     if output is not None:

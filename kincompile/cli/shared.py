@@ -11,6 +11,7 @@ import click
 
 import kincompile as kc
 from kincompile.errors import InputError
+from kincompile.model.declared import declared_fields
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -54,6 +55,19 @@ def set_option(what: str) -> Callable[[Command], Command]:
     """Return the option ``--set NAME=VALUE``, which gives values by name."""
     text = f"Value of a {what}, such as a=0.25 or phi=30deg; may be given several times."
     return click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help=text)
+
+
+def table_options(table: type) -> Callable[[Command], Command]:
+    """Add an option for each whole number of a declared table, None where it is not given."""
+
+    def added(command: Command) -> Command:
+        for name, item in reversed(declared_fields(table).items()):
+            if item.schema.get("type") == "integer":
+                limits = click.IntRange(item.schema["minimum"], item.schema["maximum"])
+                command = click.option(f"--{name}", type=limits, help=item.words)(command)
+        return command
+
+    return added
 
 
 def page_option(command: Command) -> Command:

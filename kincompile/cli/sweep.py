@@ -72,7 +72,8 @@ def command(
     found is summarised on stdout; -o writes all of it while it comes, and a run that was stopped
     goes on where it was. What cannot be solved has a status; where nothing can, the exit code is 3.
     """
-    from kincompile.files.sweep_table import SweepTable, read_sweep_table
+    from kincompile.files.sweep_table import read_sweep_table
+    from kincompile.model.tasks import Sweep
     from kincompile.sweeps.overview import overview
     from kincompile.sweeps.page import sweep_page
     from kincompile.sweeps.result import explained
@@ -80,7 +81,7 @@ def command(
     from kincompile.sweeps.worker import end_with_parent
 
     mechanism = read_model(model)
-    table = read_sweep_table(model) or SweepTable({})
+    table = read_sweep_table(model) or Sweep({})
     swept: dict[str, Any] = sweeps or values_of(table)
     numbers = motion.numbers(mechanism)
     if twice := numbers.keys() & swept.keys():

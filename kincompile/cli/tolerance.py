@@ -8,19 +8,20 @@ import click
 
 import kincompile as kc
 from kincompile.cli.motion import Motion, motion_options
-from kincompile.cli.shared import page_option, print_data, read_model, write_page
+from kincompile.cli.shared import page_option, print_data, read_model, table_options, write_page
+from kincompile.model.tasks import Tolerance
 
 
 @click.command("tolerance")
 @click.argument("model")
 @page_option
 @partial(motion_options, has_through=False)
-@click.option("--samples", type=click.IntRange(min=0), help="Samples of Monte Carlo.")
+@table_options(Tolerance)
 def command(
     model: str,
     page: str | None,
     motion: Motion,
-    samples: int | None,
+    **options: int | None,
 ) -> None:
     """Say how far the motion of MODEL deviates, as its table [tolerance] says.
 
@@ -33,8 +34,7 @@ def command(
 
     mechanism = read_model(model)
     given = read_tolerance(model)
-    if samples is not None:
-        given["samples"] = samples
+    given |= {name: x for name, x in options.items() if x is not None}
     numbers = motion.numbers(mechanism)
     times = motion.times(mechanism, numbers)
     found = kc.tolerance(mechanism, t=times, p=numbers, assembly=motion.assembly, **given)

@@ -15,7 +15,8 @@ import numpy as np
 from scipy import stats
 
 from kincompile.errors import InputError
-from kincompile.files.file_format import DISTRIBUTIONS
+from kincompile.model.declared import declared_fields
+from kincompile.model.tasks import Limits
 from kincompile.names import listed, shown
 
 if TYPE_CHECKING:
@@ -30,8 +31,8 @@ _LAWS: Any = stats
 """SciPy makes its distributions at run time, where a type checker does not see them."""
 
 
-@dataclass(frozen=True, slots=True)
-class Deviation:
+@dataclass(frozen=True)
+class Deviation(Limits):
     """Limits of a dimension's deviation from its nominal value, and how it is distributed.
 
     Attributes
@@ -52,11 +53,6 @@ class Deviation:
         no mean between them and no finite variance.
     """
 
-    low: float
-    high: float
-    distribution: Any = "normal"
-    sigmas: float = 3.0
-
     def __post_init__(self) -> None:
         """Check the values."""
         problems = []
@@ -73,10 +69,11 @@ class Deviation:
         elif not self.sigmas > 0:
             problems.append(f"sigmas is {self.sigmas:g}: give a positive number, such as 3")
         is_frozen = hasattr(self.distribution, "ppf") and hasattr(self.distribution, "std")
-        if not is_frozen and self.distribution not in DISTRIBUTIONS:
+        known = declared_fields(Limits)["distribution"].schema["enum"]
+        if not is_frozen and self.distribution not in known:
             problems.append(
                 f"there is no distribution {shown(self.distribution)}; there are "
-                f"{listed(DISTRIBUTIONS)}, and frozen ones of scipy.stats"
+                f"{listed(known)}, and frozen ones of scipy.stats"
             )
         if not problems and not self._has_moments():
             problems.append(

@@ -9,7 +9,6 @@ best     -> minimizer     with the limits as constraints               SLSQP or 
 
 from __future__ import annotations
 
-import copy
 import math
 import time
 import warnings
@@ -30,11 +29,13 @@ from kincompile.design.targets import Limit, Moves, Passing, TimeRatio
 from kincompile.design.trial import EAGERNESS, Trial, Workbench
 from kincompile.design.variation import require_mechanism
 from kincompile.errors import InputError, KincompileWarning, UnsupportedError
-from kincompile.files.file_format import MINIMIZERS, MOST_SEARCHED, MOST_STARTS, SEARCHES
+from kincompile.model import tasks
+from kincompile.model.declared import require
+from kincompile.model.mechanism import changed
 from kincompile.model.outputs import Output
 from kincompile.names import listed, suggestion
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.inputs import mapping_of, require_seed
+from kincompile.runtime.inputs import mapping_of
 from kincompile.runtime.singular.assemblies import assemblies
 
 if TYPE_CHECKING:
@@ -71,11 +72,11 @@ def fit(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     *,
     p: Mapping[str, float] | None = None,
-    samples: int = 1024,
-    starts: int = 16,
-    search: str = "sobol",
-    minimizer: str = "SLSQP",
-    seed: int = 0,
+    samples: int = tasks.Fit.samples,
+    starts: int = tasks.Fit.starts,
+    search: str = tasks.Fit.search,
+    minimizer: str = tasks.Fit.minimizer,
+    seed: int = tasks.Fit.seed,
 ) -> Fit:
     """Find dimensions with which a mechanism reaches targets, within limits.
 
@@ -120,8 +121,9 @@ def fit(
     wanted = _targets(targets)
     fixed = dict(mapping_of(p, "p"))
     names, limits = _read_bounds(model, parameters, bounds, fixed)
-    _check_options(samples, starts, search, minimizer)
-    require_seed(seed)
+    require(
+        tasks.Fit, samples=samples, starts=starts, search=search, minimizer=minimizer, seed=seed
+    )
     extended = _with_limits(model, wanted)
     module = compile_model(extended)
     _require_plan(module)
@@ -231,43 +233,18 @@ def _checked_bounds(name: str, limits: Any, problems: list[str]) -> tuple[float,
     return low, high
 
 
-def _check_options(samples: Any, starts: Any, search: str, minimizer: str) -> None:
-    """Check what says how to search."""
-    problems = [
-        f"{name} is {value!r}: give a whole number from 1 to {most:,}"
-        for name, value, most in (
-            ("samples", samples, MOST_SEARCHED),
-            ("starts", starts, MOST_STARTS),
-        )
-        if not (isinstance(value, int | np.integer) and 1 <= value <= most)
-    ]
-    problems += [
-        f"there is no {name} {value!r}; there are {listed(known)}"
-        for name, value, known in (
-            ("search", search, SEARCHES), ("minimizer", minimizer, MINIMIZERS),
-        )
-        if value not in known
-    ]  # fmt: skip
-    if problems:
-        raise InputError(problems)
-
-
 def _with_limits(model: Mechanism, targets: Sequence[Target]) -> Mechanism:
     """Return a mechanism whose outputs are also the expressions that have limits.
 
     So they are evaluated and differentiated as everything else is.
     """
-    changed = copy.copy(model)
     limits = [item for item in targets if isinstance(item, Limit)]
-    changed.outputs = [
-        *model.outputs,
-        *(
-            Output(limit_name(number), item.what)
-            for number, item in enumerate(limits)
-            if isinstance(item.what, sympy.Expr)
-        ),
+    more = [
+        Output(limit_name(number), item.what)
+        for number, item in enumerate(limits)
+        if isinstance(item.what, sympy.Expr)
     ]
-    return changed
+    return changed(model, outputs=[*model.outputs, *more])
 
 
 def _require_plan(module: ModuleType) -> None:

@@ -21,6 +21,7 @@ import sympy
 
 from kincompile.errors import InputError
 from kincompile.model.expressions import number_in
+from kincompile.model.tasks import PART
 from kincompile.names import column_name, shown
 
 if TYPE_CHECKING:
@@ -33,9 +34,6 @@ if TYPE_CHECKING:
 
 MOST_POINTS = 1000
 """Points of one target."""
-
-PART = 1e-3
-"""Part of how far wanted values are apart, or of their size, up to which they count as reached."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,7 +16,6 @@ targets = [
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import sympy
@@ -24,166 +23,109 @@ import sympy
 from kincompile.design import targets
 from kincompile.design.deviation import Deviation
 from kincompile.errors import InputError
-from kincompile.files.content import file_content
-from kincompile.files.data_text import listed_problems, read_json, read_toml
-from kincompile.files.file_fields import FieldReader
-from kincompile.files.file_format import FIELDS, TARGETS
+from kincompile.files.data_text import listed_problems
+from kincompile.files.file_format import FIELDS
+from kincompile.files.sweep_table import task_reader
+from kincompile.model import tasks
 from kincompile.model.expressions import as_sympy
 from kincompile.names import column_name, listed, name_problem
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
-    from kincompile.design.targets import Target
     from kincompile.files.data_lines import Address
+    from kincompile.files.file_fields import FieldReader
     from kincompile.model.mechanism import Mechanism
 
     Arguments = dict[str, Any]
 
-OPTIONS = ("samples", "starts", "search", "minimizer", "seed")
-"""Fields of a fit that are arguments of `kc.fit` as they are."""
-
 
 def read_tolerance(path: str | os.PathLike[str]) -> Arguments:
     """Return the arguments of `kc.tolerance` that the table `tolerance` of a model file says."""
-    reader = _reader(path, "tolerance")
-    return reader.checked(reader.tolerance())
+    reader, table = _read(path, "tolerance")
+    found = dict(vars(table))
+    found["tolerances"] = {
+        name: _made(reader, ("tolerance", "parameters", name), Deviation, **vars(item))
+        if isinstance(item, tasks.Limits)
+        else item
+        for name, item in (found.pop("parameters") or {}).items()
+    }
+    return _checked(reader, found)
 
 
 def read_fit(path: str | os.PathLike[str], model: Mechanism) -> Arguments:
     """Return the arguments of `kc.fit` that the table `fit` of a model file says."""
-    reader = _reader(path, "fit")
-    return reader.checked(reader.fit(model))
+    reader, table = _read(path, "fit")
+    found, names = dict(vars(table)), _symbols(model)
+    found["bounds"] = found.pop("parameters")
+    found["targets"] = [
+        _target(reader, item, ("fit", "targets", k), names)
+        for k, item in enumerate(found["targets"])
+    ]
+    return _checked(reader, found)
 
 
-def _reader(path: str | os.PathLike[str], section: str) -> _TaskReader:
-    """Return what reads a table of a file."""
-    file = Path(path)
-    read = {".toml": read_toml, ".json": read_json}.get(file.suffix.lower())
-    if read is None:
-        raise InputError(
-            f"{file} has no table [{section}]: give a model as .toml or .json, with that table"
-        )
-    reader = _TaskReader(read(file, file_content(file)), section)
-    if reader.row is None:
+def _read(path: str | os.PathLike[str], section: str) -> tuple[FieldReader, Any]:
+    """Return what reads a file, and its table of a command as a declared class."""
+    found = task_reader(path, section)
+    if found is None:
         fields = listed(FIELDS[section], 20)
-        raise InputError(f"{file} has no table [{section}]. Add one; its fields are: {fields}.")
-    reader.fits(reader.row, FIELDS["model"][section].schema, (section,))
-    reader.checked({})
-    return reader
+        raise InputError(f"{path} has no table [{section}]. Add one; its fields are: {fields}.")
+    reader, row = found
+    table = reader.table(row, section, (section,))
+    _checked(reader, {})
+    return reader, table
 
 
-class _TaskReader(FieldReader):
-    """Reads the fields of one of the tables."""
+def _checked(reader: FieldReader, found: Arguments) -> Arguments:
+    """Return what was read, or raise what is wrong with it."""
+    if reader.problems:
+        raise listed_problems(reader.problems)
+    return found
 
-    def __init__(self, document: Any, section: str) -> None:
-        super().__init__(document)
-        self.section = section
-        data = document.data
-        self.row: Any = data.get(section) if isinstance(data, dict) else None
 
-    def checked(self, found: Arguments) -> Arguments:
-        """Return what was read, or raise what is wrong with it."""
-        if self.problems:
-            raise listed_problems(self.problems)
-        return found
+def _made(
+    reader: FieldReader, address: Address, make: Callable[..., Any], *given: Any, **named: Any
+) -> Any:
+    """Return what a function makes of values; note what it refuses with the place in the file."""
+    try:
+        return make(*given, **named)
+    except InputError as error:
+        for problem in error.problems:
+            reader.problem(address, problem)
+        return None
 
-    def tolerance(self) -> Arguments:
-        """Return the arguments of `kc.tolerance`."""
-        row = self.row
-        found: Arguments = {
-            "tolerances": {
-                name: self._deviation(name, value)
-                for name, value in row.get("parameters", {}).items()
-            },
-            "clearances": {
-                name: self.finite(value, ("tolerance", "clearances", name))
-                for name, value in row.get("clearances", {}).items()
-            },
-            "of": tuple(row["of"]) if "of" in row else None,
-        }
-        return found | {key: row[key] for key in ("samples", "seed") if key in row}
 
-    def _deviation(self, name: str, given: Any) -> Any:
-        """Return the tolerance of a parameter."""
-        address = ("tolerance", "parameters", name)
-        if isinstance(given, list):
-            return tuple(self.finite(item, (*address, k)) for k, item in enumerate(given))
-        if not isinstance(given, dict):
-            return self.finite(given, address)
-        numbers = {
-            key: self.finite(given[key], (*address, key))
-            for key in ("low", "high", "sigmas")
-            if key in given
-        }
-        try:
-            return Deviation(**numbers, distribution=given.get("distribution", "normal"))
-        except InputError as error:
-            for problem in error.problems:
-                self.problem(address, problem)
-        return 1.0
-
-    def fit(self, model: Mechanism) -> Arguments:
-        """Return the arguments of `kc.fit`."""
-        row = self.row
-        bounds = {
-            name: tuple(self._numbers(value, ("fit", "parameters", name)))
-            for name, value in row["parameters"].items()
-        }
-        names, rows = _symbols(model), row["targets"]
-        read = [self._target(item, ("fit", "targets", k), names) for k, item in enumerate(rows)]
-        found: Arguments = {"targets": [item for item in read if item], "bounds": bounds}
-        return found | {key: row[key] for key in OPTIONS if key in row}
-
-    def _target(self, row: Any, address: Address, names: Mapping[str, sympy.Expr]) -> Target | None:
-        """Return a target."""
-        (kind,) = (kind for kind in TARGETS if kind in row)
-        if kind == "moves":
-            return targets.moves()
-        options = {
-            key: self._option(key, value, (*address, key))
-            for key, value in row.items()
-            if key != kind
-        }
-        what: Any = row[kind]
-        if kind == "limit":
-            what = self._limited(what, (*address, kind), names)
-        known = len(self.problems)
-        try:
-            found: Target = getattr(targets, kind)(what, **options)
-        except InputError as error:
-            for problem in error.problems if len(self.problems) == known else ():
-                self.problem(address, problem)
+def _target(
+    reader: FieldReader, item: Any, address: Address, names: Mapping[str, sympy.Expr]
+) -> Any:
+    """Return a target; its first field is what it is of, the others are arguments."""
+    kind = next(name for name, cls in tasks.TARGETS.items() if isinstance(item, cls))
+    options = dict(vars(item))
+    what: Any = options.pop(kind)
+    if kind == "moves":
+        return targets.moves()
+    if kind == "limit":
+        known = len(reader.problems)
+        what = _limited(reader, what, (*address, kind), names)
+        if len(reader.problems) > known:
             return None
-        return found
+    return _made(reader, address, getattr(targets, kind), what, **options)
 
-    def _option(self, key: str, value: Any, address: Address) -> Any:
-        """Return the value of a field of a target."""
-        if key == "title":
-            return value
-        if key in ("points", "poses"):
-            return [self._numbers(item, (*address, k)) for k, item in enumerate(value)]
-        if key in ("times", "values", "between"):
-            return self._numbers(value, address)
-        return self.finite(value, address)
 
-    def _limited(
-        self, text: str, address: Address, names: Mapping[str, sympy.Expr]
-    ) -> str | float | sympy.Expr:
-        """Return what has a limit: a column by its name, or else a formula."""
-        is_name = name_problem(column_name(text), "a column") is None
-        if is_name and (text not in names or column_name(text) != text):
-            return text
-        known = len(self.problems)
-        found = as_sympy(self.expression(text, address, names))
-        if len(self.problems) == known and not found.free_symbols:
-            self.problem(address, "expected a column or a formula of parameters, not a number")
-        return found
-
-    def _numbers(self, value: Any, address: Address) -> list[float]:
-        """Return a list of numbers, which may be formulas without names."""
-        return [self.finite(item, (*address, k)) for k, item in enumerate(value)]
+def _limited(
+    reader: FieldReader, text: str, address: Address, names: Mapping[str, sympy.Expr]
+) -> str | sympy.Expr:
+    """Return what has a limit: a column by its name, or else a formula."""
+    is_name = name_problem(column_name(text), "a column") is None
+    if is_name and (text not in names or column_name(text) != text):
+        return text
+    known = len(reader.problems)
+    found = as_sympy(reader.expression(text, address, names))
+    if len(reader.problems) == known and not found.free_symbols:
+        reader.problem(address, "expected a column or a formula of parameters, not a number")
+    return found
 
 
 def _symbols(model: Mechanism) -> dict[str, sympy.Expr]:

@@ -25,10 +25,11 @@ from kincompile.design.deviation import read_clearance, read_deviation
 from kincompile.design.tolerance_analysis import Drawn, ToleranceAnalysis
 from kincompile.design.variation import clearance_names, require_mechanism, with_clearances
 from kincompile.errors import InputError
-from kincompile.files.file_format import MOST_SAMPLES
+from kincompile.model.declared import require
+from kincompile.model.tasks import Tolerance
 from kincompile.names import listed, suggestion
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.inputs import mapping_of, require_seed
+from kincompile.runtime.inputs import mapping_of
 from kincompile.runtime.results.sensitivities import sensitivities
 from kincompile.runtime.solve import solve
 
@@ -63,8 +64,8 @@ def tolerance(
     p: Mapping[str, float] | None = None,
     guess: Mapping[str, float] | None = None,
     assembly: int | None = None,
-    samples: int = 0,
-    seed: int = 0,
+    samples: int = Tolerance.samples,
+    seed: int = Tolerance.seed,
 ) -> ToleranceAnalysis:
     r"""Say how far a motion deviates for given tolerances: worst case, RSS and Monte Carlo.
 
@@ -109,11 +110,8 @@ def tolerance(
     """
     model = require_mechanism(model, "kc.tolerance")
     loose = mapping_of(clearances, "clearances")
-    require_seed(seed)
+    require(Tolerance, samples=samples, seed=seed)
     sources = _sources(model, tolerances, loose)
-    wanted: Any = samples  # whatever its type says
-    if not isinstance(wanted, int | np.integer) or not 0 <= wanted <= MOST_SAMPLES:
-        raise InputError(f"samples is {samples!r}: give a whole number up to {MOST_SAMPLES:,}.")
     module = compile_model(with_clearances(model, loose))
     columns = columns_of(code_of(module), of)
     times = np.linspace(0.0, model.end, model.points) if t is None else t

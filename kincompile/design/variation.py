@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,7 @@ import sympy
 from kincompile.errors import InputError
 from kincompile.model.bodies import Body, Parameter
 from kincompile.model.constraint import Constraint
-from kincompile.model.mechanism import Mechanism
+from kincompile.model.mechanism import Mechanism, changed
 from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:
@@ -53,18 +52,14 @@ def with_clearances(model: Mechanism, joints: Iterable[str]) -> Mechanism:
     ]
     if problems:
         raise InputError(problems)
-    changed = copy.copy(model)
     shifts = {name: clearance_names(name) for name in pinned if name in loose}
-    unit = model.length_unit
-    changed.parameters = [
-        *model.parameters,
-        *(Parameter(name, 0.0, unit) for names in shifts.values() for name in names),
-    ]
-    changed.constraints = [
+    names = [name for pair in shifts.values() for name in pair]
+    more = [Parameter(name, 0.0, model.length_unit) for name in names]
+    constraints = [
         _shifted(item, shifts[item.name]) if item.name in shifts else item
         for item in model.constraints
     ]
-    return changed
+    return changed(model, parameters=[*model.parameters, *more], constraints=constraints)
 
 
 def _point(item: Any) -> tuple[Any, ...]:
@@ -87,10 +82,11 @@ def with_values(
 
     Parameters without a value keep theirs, and so do bodies of which a coordinate is missing.
     """
-    changed = copy.copy(model)
-    changed.parameters = [_valued(item, values) for item in model.parameters]
-    changed.bodies = [_guessed(item, guess) for item in model.bodies]
-    return changed
+    return changed(
+        model,
+        parameters=[_valued(item, values) for item in model.parameters],
+        bodies=[_guessed(item, guess) for item in model.bodies],
+    )
 
 
 def _valued(item: Parameter, values: Mapping[str, float]) -> Parameter:

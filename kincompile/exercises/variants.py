@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from random import Random
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -19,9 +19,11 @@ from kincompile.errors import (
     UnsupportedError,
 )
 from kincompile.model.arguments import Kind
-from kincompile.model.bodies import GROUND
+from kincompile.model.bodies import GROUND, PLANAR
 from kincompile.model.constraint import Constraint
 from kincompile.model.equation import Equation
+from kincompile.model.mechanism import changed
+from kincompile.model.points import BodyPoint
 from kincompile.runtime.solve import solve
 
 if TYPE_CHECKING:
@@ -57,7 +59,7 @@ class Choices:
 
 
 @dataclass(frozen=True, slots=True)
-class _Change:
+class Change:
     """How a variant differs: values of parameters, factor of lengths by body, turned bodies."""
 
     values: tuple[tuple[str, float], ...]
@@ -71,7 +73,7 @@ def variants(mechanism: Mechanism, count: int, seed: int, choices: Choices) -> l
     Their parameters are numbers, so that formulas by hand are written with these.
     """
     _require_generic(mechanism)
-    found: dict[_Change, Mechanism] = {}
+    found: dict[Change, Mechanism] = {}
     for student in range(1, count + 1):
         random = Random(f"{seed}-{student}")
         for _ in range(ATTEMPTS):
@@ -101,7 +103,7 @@ def _require_generic(mechanism: Mechanism) -> None:
             ) from None
 
 
-def _drawn(mechanism: Mechanism, random: Random, choices: Choices) -> _Change:
+def _drawn(mechanism: Mechanism, random: Random, choices: Choices) -> Change:
     values = tuple(
         (item.name, _rounded((item.default or 0.0) * random.choice(FACTORS)))
         for item in mechanism.system().parameters
@@ -112,7 +114,7 @@ def _drawn(mechanism: Mechanism, random: Random, choices: Choices) -> _Change:
     if _has_profiles(mechanism):  # what rolls on each other keeps its shape
         factors = factors[:1] * len(bodies)
     turned = [body for body in bodies[1:] if choices.signs and random.random() < 0.5]
-    return _Change(values, tuple(zip(bodies, factors, strict=True)), tuple(turned))
+    return Change(values, tuple(zip(bodies, factors, strict=True)), tuple(turned))
 
 
 def _has_profiles(mechanism: Mechanism) -> bool:
@@ -129,9 +131,9 @@ def _rounded(value: float) -> float:
     return float(f"{value:.2g}")
 
 
-def _checked(mechanism: Mechanism, change: _Change) -> Mechanism | None:
+def _checked(mechanism: Mechanism, change: Change) -> Mechanism | None:
     """Return a variant, None if it does not assemble or its motion is singular somewhere."""
-    made = _VariantBuilder(mechanism, change).mechanism()
+    made = VariantBuilder(mechanism, change).mechanism()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -144,51 +146,94 @@ def _checked(mechanism: Mechanism, change: _Change) -> Mechanism | None:
     return made if is_regular and float(solution.condition.max()) < LARGEST_CONDITION else None
 
 
-class _VariantBuilder:
-    """Builds the variant of a mechanism, constraint by constraint."""
+class VariantBuilder:
+    """Builds the variant of a mechanism: numbers for parameters, frames turned, lengths changed."""
 
-    def __init__(self, mechanism: Mechanism, change: _Change) -> None:
+    def __init__(self, mechanism: Mechanism, change: Change) -> None:
         self._mechanism = mechanism
         self._values: Any = {sympy.Symbol(name): _exact(value) for name, value in change.values}
+        self._moved: Any = {}
         self._factors = dict(change.factors)
         self._turned = frozenset(change.turned)
-        self._made = type(mechanism)(
-            mechanism.name,
-            length_unit=mechanism.length_unit,
-            end=float(sympy.sympify(mechanism.end_given).subs(self._values)),
-            points=mechanism.points,
-        )
         self._bodies = {body.name: self._body(body) for body in mechanism.bodies}
+        points = [item for item in mechanism.outputs if isinstance(item, BodyPoint)]
+        # What stands for a point's coordinates in equations, outputs and forces.
+        self._moved = {
+            old: new
+            for item in points
+            for old, new in zip(item.coordinates, self._point(item).coordinates, strict=True)
+        }
 
     def mechanism(self) -> Mechanism:
-        """Return the variant."""
-        for item in self._mechanism.constraints:
-            self._made.add(
-                self._equation(item) if isinstance(item, Equation) else self._constraint(item)
-            )
-        return self._made
+        """Return the variant; tables of commands, which are of parameters, are left out."""
+        given = self._mechanism
+        return changed(
+            given,
+            parameters=[],
+            bodies=list(self._bodies.values()),
+            constraints=[
+                self._equation(item) if isinstance(item, Equation) else self._element(item)
+                for item in given.constraints
+            ],
+            loads=[self._element(item) for item in given.loads],
+            outputs=[
+                self._point(item)
+                if isinstance(item, BodyPoint)
+                else replace(item, expression=self._substituted(item.expression))
+                for item in given.outputs
+            ],
+            gravity=tuple(self._value(item, 1.0) for item in given.gravity),
+            end=float(sympy.sympify(given.end_given).subs(self._values)),
+            tasks={},
+        )
 
     def _body(self, body: Body) -> Body:
-        factor = self._factors[body.name]
-        if len(body.kind.axes) == len("xyz"):
-            return self._in_space(body, factor)
-        sign, _ = self._signs(body.name)
-        x, y, phi = (self._number(value) for value in body.guess)
-        turn = sympy.pi if sign < 0 else 0
-        guess = (x * factor, y * factor, float(phi + turn))
-        outline = [tuple(self._number(v, sign * factor) for v in corner) for corner in body.outline]
-        return self._made.body(body.name, guess, outline)
+        factor, signs = self._factors[body.name], self._signs(body.name)
+        own = {
+            name: self._value(value, 1.0)
+            for name in ("mass", "density", "thickness")
+            if (value := getattr(body, name)) is not None
+        }
+        outline = [self._moved_by(corner, signs, factor) for corner in body.outline]
+        centre = self._moved_by(body.centre, signs, factor)
+        guess = self._guess(body, factor)
+        inertia = self._inertia(body.inertia, signs)
+        return replace(body, guess=guess, outline=outline, centre=centre, inertia=inertia, **own)
 
-    def _in_space(self, body: Body, factor: float) -> Body:
-        """Return a body in space; half a turn about its zeta axis makes p to p (0, 0, 0, 1)."""
-        place = tuple(self._number(value, factor) for value in body.guess[:3])
-        p = [float(sympy.sympify(value).subs(self._values)) for value in body.guess[3:]]
-        if body.name in self._turned:
+    def _guess(self, body: Body, factor: float) -> tuple[float, ...]:
+        """Return the guess; half a turn of a frame is one about zeta, p to p (0, 0, 0, 1)."""
+        size = len(body.kind.axes)
+        place = tuple(self._number(value, factor) for value in body.guess[:size])
+        is_turned = body.name in self._turned
+        if body.kind is PLANAR:
+            turn = sympy.pi if is_turned else 0
+            return (*place, float(self._number(body.guess[2]) + turn))
+        p = [float(sympy.sympify(value).subs(self._values)) for value in body.guess[size:]]
+        if is_turned:
             p = [-p[3], p[2], -p[1], p[0]]
-        size = math.hypot(*p)
-        made: Any = self._made
-        turned: Body = made.body(body.name, place, tuple(item / size for item in p))
-        return turned
+        length = math.hypot(*p)
+        return (*place, *(item / length for item in p))
+
+    def _inertia(self, given: Any, signs: tuple[int, ...]) -> Any:
+        """Return an inertia: products of inertia change their signs with the axes."""
+        if given is None or not hasattr(given, "__len__"):
+            return self._value(given, 1.0)
+        if not hasattr(given[0], "__len__"):
+            return tuple(self._value(item, 1.0) for item in given)
+        return [
+            [self._value(i * j * sympy.sympify(x), 1.0) for x, j in zip(row, signs, strict=True)]
+            for row, i in zip(given, signs, strict=True)
+        ]
+
+    def _point(self, point: BodyPoint) -> BodyPoint:
+        """Return a named point, moved with its body."""
+        name = point.body.name
+        local = self._moved_by(point.local, self._signs(name), self._factors[name])
+        return replace(point, body=self._bodies.get(name, self._mechanism.ground), local=local)
+
+    def _moved_by(self, given: Any, signs: tuple[int, ...], factor: float) -> tuple[float, ...]:
+        """Return a vector of a body whose frame is turned, and whose lengths are multiplied."""
+        return tuple(self._number(x, sign * factor) for x, sign in zip(given, signs, strict=True))
 
     def _signs(self, body: str) -> tuple[int, ...]:
         """Return what half a turn of a frame makes of the components of its vectors."""
@@ -196,40 +241,38 @@ class _VariantBuilder:
         return (sign, sign, 1)[: len(self._mechanism.ground.kind.axes)]
 
     def _equation(self, equation: Equation) -> Equation:
-        expressions: list[Any] = [
-            sympy.sympify(item).subs(self._values) for item in equation.expressions
-        ]
-        return Equation(equation.name, *expressions)
+        expressions = [self._substituted(item) for item in equation.expressions]
+        return Equation(equation.name, *expressions, corners=equation.corners)
 
-    def _constraint(self, constraint: Constraint) -> Constraint:
-        """Return a constraint with numbers for parameters, its points moved with their bodies."""
-        arguments = constraint.arguments()
-        changed: dict[str, Any] = {}
+    def _element(self, element: Any) -> Any:
+        """Return a constraint or a load with numbers for parameters, moved with its bodies."""
+        arguments = element.arguments()
         names = {
-            item.symbol: _name(getattr(constraint, key))
+            item.symbol: _name(getattr(element, key))
             for key, item in arguments.items()
             if item.kind is Kind.BODY
         } | {GROUND.name: GROUND.name}
-        for item in fields(constraint):
-            given = getattr(constraint, item.name)
-            argument = arguments.get(item.name)
-            if argument is None:
-                continue
-            owner = names.get(argument.on, GROUND.name)
-            if argument.kind is Kind.BODY:
-                changed[item.name] = self._bodies.get(_name(given), self._made.ground)
-            elif argument.kind in (Kind.POINT, Kind.AXIS):
-                scale = self._factors[owner] if argument.kind is Kind.POINT else 1.0
-                changed[item.name] = tuple(
-                    self._number(value, sign * scale)
-                    for value, sign in zip(given, self._signs(owner), strict=True)
-                )
-            elif argument.kind is Kind.PROFILE:
-                changed[item.name] = self._profile(given)
+        made: dict[str, Any] = {}
+        for key, item in arguments.items():
+            given, owner = getattr(element, key), names.get(item.on, GROUND.name)
+            if item.kind is Kind.BODY:
+                made[key] = self._bodies.get(_name(given), self._mechanism.ground)
+            elif item.kind in (Kind.POINT, Kind.AXIS):
+                scale = self._factors[owner] if item.kind is Kind.POINT else 1.0
+                made[key] = self._moved_by(given, self._signs(owner), scale)
+            elif item.kind is Kind.PROFILE:
+                made[key] = self._profile(given)
+            elif item.kind is Kind.LOADS:
+                made[key] = tuple(self._value(part, 1.0) for part in given)
             else:
-                is_length = argument.kind in (Kind.RADIUS, Kind.DISTANCE)
-                changed[item.name] = self._value(given, self._common if is_length else 1.0)
-        return replace(constraint, **changed)
+                is_length = item.kind in (Kind.RADIUS, Kind.DISTANCE)
+                made[key] = self._value(given, self._common if is_length else 1.0)
+        return replace(element, **made)
+
+    def _substituted(self, given: Any) -> sympy.Expr:
+        """Return an expression with numbers for parameters, and points where they are now."""
+        found: sympy.Expr = sympy.sympify(given).xreplace(self._moved).subs(self._values)
+        return found
 
     @property
     def _common(self) -> float:
@@ -243,7 +286,9 @@ class _VariantBuilder:
 
     def _value(self, given: Any, factor: float) -> Any:
         """Return a number, or an expression of time, with numbers for the parameters."""
-        value = sympy.sympify(given).subs(self._values)
+        if given is None:
+            return None
+        value = self._substituted(given)
         return value if value.free_symbols else self._number(given, factor)
 
     def _number(self, given: Any, factor: float = 1.0) -> float:

@@ -40,10 +40,13 @@ class BodyReader(SketchReader):
 
     def body(self, address: Address, row: Row) -> Body | None:
         """Return a body, or None if its name is invalid or already taken."""
-        self.has_fields(address, row, fields_of("body", self.words.count))
+        before, fields = len(self.problems), fields_of("body", self.words.count)
+        self.has_fields(address, row, fields)
         name = self.name(row, address, "a body")
-        read = self._flat if self.words.count == PLANE else self._spatial
-        body, places = read(name, address, row)
+        given = self.values(row, fields, address, self.names)
+        if len(self.problems) > before:  # nothing is said of what stands in its place
+            given.clear()
+        body = self.words.mechanism("").body(name, **given)
         if not name:
             return None
         if name == GROUND.name or name in self.bodies:
@@ -54,58 +57,14 @@ class BodyReader(SketchReader):
         self.bodies[name] = address
         for title in (f"body {name!r}", f"Mass {name!r}"):
             self.remember(title, address)
+        turned = next((key for key in ("angle", "orientation") if key in row), "name")
+        places = ("guess",) * 3 if "guess" in fields else (*("position",) * 3, *(turned,) * 4)
         for coordinate, place in zip(body.coordinates, places, strict=True):
             self.names[coordinate] = sympy.Symbol(coordinate)
             self.remember(f"guess of {coordinate}", (*address, place))
         self.spins |= {key: spin for key, spin, _ in body.on_request}
         self.remember(f"outline of {name}", (*address, "outline"))
         return body
-
-    def _flat(self, name: str, address: Address, row: Row) -> tuple[Body, tuple[str, ...]]:
-        start = self.components(row.get("guess", [0] * 3), (*address, "guess"), "[x, y, phi]")
-        outline = self._outline(row.get("outline", []), (*address, "outline"))
-        heavy: dict[str, Any] = {
-            key: self.expression(row[key], (*address, key), self.names)
-            for key in ("mass", "inertia", "density", "thickness")
-            if key in row
-        }
-        centre = self.place(row, address, "centre")
-        return Body(name, start, outline, centre=centre, **heavy), ("guess",) * 3
-
-    def _spatial(self, name: str, address: Address, row: Row) -> tuple[Body, tuple[str, ...]]:
-        before = len(self.problems)
-        given: dict[str, Any] = {
-            key: self.components(row[key], (*address, key), "[x, y, z]")
-            for key in ("position", "axis", "x", "y", "z", "centre")
-            if key in row
-        }
-        for key in ("angle", "mass"):
-            if key in row:
-                given[key] = self.expression(row[key], (*address, key), self.names)
-        if "inertia" in row:
-            given["inertia"] = self._inertia(row["inertia"], (*address, "inertia"))
-        if "orientation" in row:
-            place = (*address, "orientation")
-            given["orientation"] = self._orientation(row["orientation"], place)
-        if len(self.problems) > before:  # nothing is said of what stands in its place
-            given.clear()
-        body = self.words.mechanism("").body(name, **given)
-        turned = next((key for key in ("angle", "orientation") if key in row), "name")
-        return body, (*("position",) * 3, *(turned,) * 4)
-
-    def _orientation(self, given: Any, address: Address) -> Any:
-        if isinstance(given, list) and len(given) == 3:
-            return self._rows(given, address)
-        return self.components(given, address, "[e0, e1, e2, e3]")
-
-    def _inertia(self, given: Any, address: Address) -> Any:
-        if isinstance(given, list) and any(isinstance(row, list) for row in given):
-            return self._rows(given, address)
-        return self.components(given, address, "[J_xi, J_eta, J_zeta]")
-
-    def _rows(self, given: list[Any], address: Address) -> list[tuple[Any, ...]]:
-        rows = enumerate(given)
-        return [self.components(row, (*address, k), "[., ., .]") for k, row in rows]
 
     def components(self, given: Any, address: Address, words: str) -> tuple[Any, ...]:
         """Return numbers or formulas, as many as the words have: ``[xi, eta]``."""
@@ -115,14 +74,6 @@ class BodyReader(SketchReader):
         """Return a vector of a table in global directions, zeros where it has none."""
         words = ("[x, y]", "[x, y, z]")[self.words.count - PLANE]
         return self.components(row.get(key, [0] * self.words.count), (*address, key), words)
-
-    def _outline(self, given: Any, address: Address) -> tuple[Scalars, ...]:
-        if not isinstance(given, list):
-            self.problem(address, f"expected a list of corners [xi, eta], not {shown(given)}")
-            return ()
-        return tuple(
-            self.components(corner, (*address, k), "[xi, eta]") for k, corner in enumerate(given)
-        )
 
     def point(self, address: Address, row: Row) -> BodyPoint | None:
         """Return a named point; its coordinates may occur in every formula."""

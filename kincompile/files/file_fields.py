@@ -7,20 +7,24 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from kincompile.files.data_text import MAX_PROBLEMS, listed_problems
-from kincompile.files.file_format import FIELDS, PLAIN_NUMBER, TARGETS
+from kincompile.files.file_format import DECLARED, FIELDS, PLAIN_NUMBER, TARGETS
 from kincompile.files.formula_text import ExpressionError
 from kincompile.files.safe_expressions import parse_expression
+from kincompile.model import tasks
+from kincompile.model.declared import expected, may_be, may_hold
 from kincompile.model.expressions import evaluate
 from kincompile.names import LONGEST, escaped, listed, name_problem, shown, suggestion, unit_problem
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     import sympy
 
     from kincompile.files.data_lines import Address
     from kincompile.files.data_text import Document
-    from kincompile.files.file_format import Field
+    from kincompile.model.declared import Field, Schema
+
+    Names = Mapping[str, sympy.Expr]
 
 _SINGULAR = {"bodies": "body"}
 
@@ -86,48 +90,86 @@ class FieldReader:
             self.problem(address, f"no {listed(missing, 20)}; fields are: {listed(fields, 20)}")
         return not missing
 
-    def fits(self, value: Any, schema: Mapping[str, Any], address: Address) -> None:
-        """Check a value against its schema; formulas are read later."""
-        if "$ref" in schema:
-            self._fits_table(value, schema["$ref"].rpartition("/")[2], address)
-        elif "anyOf" in schema:
-            likely = [item for item in schema["anyOf"] if _may_be(value, item)]
-            if likely:
-                self.fits(value, likely[0], address)
-            else:
-                self.problem(address, f"expected {_expected(schema)}, not {shown(value)}")
-        elif not _may_be(value, schema):
-            self.problem(address, f"expected {_expected(schema)}, not {shown(value)}")
-        elif isinstance(value, dict):
-            for key, item in value.items():
-                self.fits(item, schema["additionalProperties"], (*address, key))
-        elif isinstance(value, list):
-            least, most = schema.get("minItems", 0), schema.get("maxItems", len(value))
-            if not least <= len(value) <= most:
-                count = f"{least}" if least == most else f"at least {least}"
-                self.problem(address, f"expected a list of {count}, not {shown(value)}")
-            for k, item in enumerate(value):
-                self.fits(item, schema["items"], (*address, k))
+    def values(
+        self,
+        row: Mapping[str, Any],
+        fields: Mapping[str, Field],
+        address: Address,
+        names: Names | None,
+        skipped: Collection[str] = ("name",),
+    ) -> dict[str, Any]:
+        """Return the values of a table by attribute; formulas have these names."""
+        found = {
+            item.attribute or key: self.value(row[key], item.schema, (*address, key), names)
+            for key, item in fields.items()
+            if key in row and key not in skipped
+        }
+        return {key: value for key, value in found.items() if value is not None}
 
-    def _fits_table(self, value: Any, name: str, address: Address) -> None:
-        """Check a formula, a target of a fit, or a table of a name of the format."""
-        if name in ("expression", "constant"):
-            is_formula = isinstance(value, str)
-            if not is_formula or (name == "constant" and _is_number(value)):
-                self.constant(value, address, {})
-            return
-        if not isinstance(value, dict):
-            self.problem(address, f"expected a table of fields, not {shown(value)}")
-            return
-        kinds = TARGETS if name == "target" else {name: FIELDS[name]}
-        given = [kind for kind in kinds if kind in value or name != "target"]
-        if len(given) != 1:
-            self.problem(address, f"expected one target: {listed(TARGETS)}, not {shown(value)}")
-            return
-        fields = kinds[given[0]]
-        self.has_fields(address, value, fields)
-        for key in fields.keys() & value.keys():
-            self.fits(value[key], fields[key].schema, (*address, key))
+    def value(
+        self, given: Any, schema: Schema, address: Address, names: Names | None = None
+    ) -> Any:
+        """Return a value of a kind, tables as their declared classes; None on a problem.
+
+        Without names formulas are numbers.
+        """
+        if "anyOf" in schema:
+            likely = [item for item in schema["anyOf"] if may_be(given, item)]
+            if likely:
+                best = (item for item in likely if may_hold(given, item))
+                return self.value(given, next(best, likely[0]), address, names)
+        elif "$ref" in schema:
+            name = schema["$ref"].rpartition("/")[2]
+            if name in ("constant", "expression") and names is not None:
+                read = self.constant if name == "constant" else self.expression
+                return read(given, address, names)
+            return (
+                self.finite(given, address)
+                if name == "constant"
+                else self.table(given, name, address)
+            )
+        elif may_be(given, schema):
+            return self._members(given, schema, address, names)
+        self.problem(address, f"expected {expected(schema)}, not {shown(given)}")
+        return None
+
+    def _members(self, given: Any, schema: Schema, address: Address, names: Names | None) -> Any:
+        """Return a value whose type fits, and so do the values in it."""
+        if schema.get("format") == "unit":
+            return self.unit(given, address, self.owner(address))
+        if isinstance(given, dict):
+            of = schema["additionalProperties"]
+            return {key: self.value(x, of, (*address, key), names) for key, x in given.items()}
+        if not isinstance(given, list):
+            return given
+        least, most = schema.get("minItems", 0), schema.get("maxItems", len(given))
+        if not least <= len(given) <= most:
+            count = f"{least}" if least == most else f"at least {least}"
+            words = schema.get("description", f"a list of {count}")
+            self.problem(address, f"expected {words}, not {shown(given)}")
+            return None
+        of = schema["items"]
+        found = [self.value(item, of, (*address, k), names) for k, item in enumerate(given)]
+        return None if None in found else tuple(found)
+
+    def owner(self, address: Address) -> str:
+        """Return what a field belongs to, in words: ``parameter 'a'``."""
+        return self._field(address[:2])
+
+    def table(self, given: Any, name: str, address: Address) -> Any:
+        """Return a table, by its name in the schema, as its declared class; None on a problem."""
+        if not isinstance(given, dict):
+            self.problem(address, f"expected a table of fields, not {shown(given)}")
+            return None
+        kinds = tasks.TARGETS if name == "target" else {name: DECLARED[name]}
+        likely = [kind for kind in kinds if kind in given or name != "target"]
+        if len(likely) != 1:
+            self.problem(address, f"expected one target: {listed(TARGETS)}, not {shown(given)}")
+            return None
+        known, before = (TARGETS if name == "target" else FIELDS)[likely[0]], len(self.problems)
+        self.has_fields(address, given, known)
+        values = self.values(given, known, address, None, ())
+        return None if len(self.problems) > before else kinds[likely[0]](**values)
 
     def rows(
         self, data: Mapping[str, Any], section: str
@@ -225,39 +267,5 @@ class FieldReader:
         return [self.expression(item, (*address, k), names) for k, item in enumerate(value)]
 
 
-_TYPES: Mapping[str, type | tuple[type, ...]] = {
-    "object": dict, "array": list, "string": str, "boolean": bool, "integer": int,
-    "number": (int, float),
-}  # fmt: skip
-
-
-def _may_be(value: Any, schema: Mapping[str, Any]) -> bool:
-    """Return whether a value is of the type of a schema, and within its limits."""
-    if "$ref" in schema:
-        is_table = not schema["$ref"].endswith(("/expression", "/constant"))
-        return isinstance(value, dict if is_table else int | float | str)
-    if "enum" in schema or "const" in schema:
-        return value in schema.get("enum", (schema.get("const"),))
-    kind = str(schema["type"])
-    if isinstance(value, bool) != (kind == "boolean") or not isinstance(value, _TYPES[kind]):
-        return False
-    return kind != "integer" or bool(schema["minimum"] <= value <= schema["maximum"])
-
-
 def _is_number(text: str) -> bool:
     return re.search(PLAIN_NUMBER, text) is not None
-
-
-def _expected(schema: Mapping[str, Any]) -> str:
-    """Return in words what a schema takes."""
-    if "description" in schema:
-        return str(schema["description"])
-    if "enum" in schema or "const" in schema:
-        return listed(shown(item) for item in schema.get("enum", (schema.get("const"),)))
-    if schema["type"] == "integer":
-        return f"a whole number from {schema['minimum']} to {schema['maximum']:,}"
-    words = {
-        "object": "names and values", "array": "a list", "string": "a text in quotes",
-        "boolean": "true or false", "number": "a number",
-    }  # fmt: skip
-    return words[schema["type"]]

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, fields
 from typing import TYPE_CHECKING, Any
 
 from kincompile.files.dimensions import PLANE, SPACE, dimensions
+from kincompile.model import declared as kind
+from kincompile.model import tasks
 from kincompile.model.arguments import Kind
+from kincompile.model.bodies import Body, Coordinate, Parameter
+from kincompile.model.declared import Field, declared_fields
 from kincompile.model.laws import RISES
-from kincompile.names import LARGEST_SEED, MOST_CHARACTERS
+from kincompile.model.outputs import Output
+from kincompile.model.points import BodyPoint
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,229 +25,125 @@ VERSION = 1
 """Version of the format, the value of the key `kincompile`."""
 MOST_POINTS = 10_000_000
 """Largest time grid that a file may ask for."""
-MOST_VARIANTS = 10_000_000
-"""Largest number of values of all parameters together that a file may ask for."""
-MOST_SAMPLES = 2**24
-"""Largest number of samples of a tolerance analysis."""
-MOST_SEARCHED, MOST_STARTS = 2**20, 10_000
-"""Largest number of sets that a fit may search, and of starts that it may follow."""
 MOST_DRAWN, MOST_JOINTS = 300, 30
 """Largest number of joints, parts and parameters of a drawing, and of joints of one link."""
 SMOOTHNESS = 4
 """Continuous derivatives of a profile given by a table: it is a periodic quintic spline."""
 
 
-@dataclass(frozen=True, slots=True)
-class Field:
-    """A field of a table."""
-
-    schema: Mapping[str, Any]
-    is_required: bool = True
+PLAIN_NUMBER = r"^\s*[+-]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)([eE][+-]?\d+)?\s*$"
+"""A number in quotes, which a constant may not be: it needs none."""
 
 
 def _optional(schema: Mapping[str, Any]) -> Field:
     return Field(schema, is_required=False)
 
 
-def _ref(name: str) -> dict[str, Any]:
-    return {"$ref": f"#/$defs/{name}"}
+_POINT, _TRIPLE = kind.components(2), kind.components(3)
+_LOCAL = kind.components(3, words="[xi, eta, zeta]")
+_PLACE = kind.components(3, words="[x, y, z]")
+_MATRIX = kind.components(3, kind.components(3, words="[., ., .]"))
+_NUMBERS: dict[str, Any] = kind.array(kind.NUMBER, 6)
+_VALUES: dict[str, Any] = kind.array(kind.EXPRESSION, 3)
+_LAW: dict[str, Any] = kind.one_of(RISES)
 
-
-def _any_of(*schemas: Mapping[str, Any]) -> dict[str, Any]:
-    return {"anyOf": list(schemas)}
-
-
-def _map(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {"type": "object", "additionalProperties": values}
-
-
-def _array(items: Mapping[str, Any], least: int = 0) -> dict[str, Any]:
-    return {"type": "array", "items": items} | ({"minItems": least} if least else {})
-
-
-_TEXT: dict[str, Any] = {"type": "string"}
-_NAME: dict[str, Any] = {
-    "type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_]*$", "maxLength": MOST_CHARACTERS,
+DECLARED: Mapping[str, type] = {
+    "parameter": Parameter, "body": Body, "coordinate": Coordinate, "point": BodyPoint,
+    "output": Output, "sweep": tasks.Sweep, "span": tasks.Span, "fit": tasks.Fit,
+    "tolerance": tasks.Tolerance, "deviation": tasks.Limits,
 }  # fmt: skip
-_NUMBER: dict[str, Any] = {"type": "number"}
-_EXPRESSION: dict[str, Any] = _ref("expression")
-_CONSTANT: dict[str, Any] = _ref("constant")
-PLAIN_NUMBER = r"^\s*[+-]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)([eE][+-]?\d+)?\s*$"
-"""A number in quotes, which a constant may not be: it needs none."""
-
-
-def _components(count: int, of: Mapping[str, Any] = _EXPRESSION) -> dict[str, Any]:
-    """Return the schema of a fixed number of numbers or formulas."""
-    return {"type": "array", "items": of, "minItems": count, "maxItems": count}
-
-
-_POINT, _PAIR = _components(2), _components(2, _CONSTANT)
-_TRIPLE = _components(3)
-_NUMBERS: dict[str, Any] = _array(_NUMBER, 6)
-_VALUES: dict[str, Any] = _array(_EXPRESSION, 3)
-_NAMES: dict[str, Any] = _array(_TEXT) | {"description": "a list of names in quotes"}
-_VARIANTS: dict[str, Any] = {"type": "integer", "minimum": 1, "maximum": MOST_VARIANTS}
-_LAW: dict[str, Any] = {"enum": list(RISES)}
-_CORNERS: dict[str, Any] = {"type": "boolean"}
-
-
-_SEED: dict[str, Any] = {"type": "integer", "minimum": 0, "maximum": LARGEST_SEED}
-
-_SWEPT = {"description": "a list of values, or { from = 0.2, to = 0.6, count = 5 }"}
-_DEVIATION = {"description": "a number, two limits, or { low = -1e-4, high = 2e-4 }"}
-
-DISTRIBUTIONS = ("normal", "uniform", "truncated")
-SEARCHES = ("sobol", "differential evolution")
-MINIMIZERS = ("SLSQP", "trust-constr")
-"""What tolerances may be distributed by, and how a fit may search and end."""
+"""Tables that are declared classes, by their names in the schema."""
 
 TASKS = ("tolerance", "fit", "sweep")
 """Tables that commands of these names read; to a model they belong as data."""
 
-
-def _list(name: str) -> dict[str, Any]:
-    return _array(_ref(name)) | {"description": "a list of tables"}
-
-
-FIELDS: Mapping[str, Mapping[str, Field]] = {
+FIELDS: dict[str, Mapping[str, Field]] = {
     "model": {
-        "$schema": _optional(_TEXT),
+        "$schema": _optional(kind.TEXT),
         "kincompile": Field({"const": VERSION}),
         "space": _optional({"enum": [PLANE, SPACE]}),
-        "name": Field(_NAME),
-        "length_unit": _optional(_TEXT),
-        "analysis": _optional(_ref("analysis")),
-        "parameters": _optional(_list("parameter")),
-        "bodies": _optional(_list("body")),
-        "coordinates": _optional(_list("coordinate")),
-        "sketch": _optional(_ref("sketch")),
-        "constraints": _optional(_list("constraint")),
+        "name": Field(kind.NAME),
+        "length_unit": _optional(kind.TEXT),
+        "analysis": _optional(kind.ref("analysis")),
+        "parameters": _optional(kind.tables("parameter")),
+        "bodies": _optional(kind.tables("body")),
+        "coordinates": _optional(kind.tables("coordinate")),
+        "sketch": _optional(kind.ref("sketch")),
+        "constraints": _optional(kind.tables("constraint")),
         "gravity": _optional(_POINT),
-        "loads": _optional(_list("load")),
-        "points": _optional(_list("point")),
-        "outputs": _optional(_list("output")),
-        "sweep": _optional(_ref("sweep")),
-        "tolerance": _optional(_ref("tolerance")),
-        "fit": _optional(_ref("fit")),
+        "loads": _optional(kind.tables("load")),
+        "points": _optional(kind.tables("point")),
+        "outputs": _optional(kind.tables("output")),
+        "sweep": _optional(kind.ref("sweep")),
+        "tolerance": _optional(kind.ref("tolerance")),
+        "fit": _optional(kind.ref("fit")),
     },
-    "tolerance": {
-        "of": _optional(_NAMES),
-        "parameters": _optional(_map(_any_of(_CONSTANT, _PAIR, _ref("deviation")) | _DEVIATION)),
-        "clearances": _optional(_map(_CONSTANT)),
-        "samples": _optional({**_VARIANTS, "minimum": 0, "maximum": MOST_SAMPLES}),
-        "seed": _optional(_SEED),
-    },
-    "deviation": {
-        "low": Field(_CONSTANT),
-        "high": Field(_CONSTANT),
-        "distribution": _optional({"enum": list(DISTRIBUTIONS)}),
-        "sigmas": _optional(_CONSTANT),
-    },
-    "fit": {
-        "parameters": Field(_map(_PAIR)),
-        "targets": Field(_list("target")),
-        "samples": _optional({**_VARIANTS, "maximum": MOST_SEARCHED}),
-        "starts": _optional({**_VARIANTS, "maximum": MOST_STARTS}),
-        "search": _optional({"enum": list(SEARCHES)}),
-        "minimizer": _optional({"enum": list(MINIMIZERS)}),
-        "seed": _optional(_SEED),
-    },
-    "sweep": {
-        "parameters": Field(_map(_any_of(_array(_CONSTANT, 1), _ref("span")) | _SWEPT)),
-        "samples": _optional(_VARIANTS),
-        "product": _optional({"type": "boolean"}),
-        "columns": _optional(_NAMES),
-        "measures": _optional(_NAMES),
-    },
-    "span": {
-        "from": Field(_CONSTANT),
-        "to": Field(_CONSTANT),
-        "count": _optional(_VARIANTS),
-    },
+    **{name: declared_fields(item) for name, item in DECLARED.items()},
     "sketch": {
-        "lengths": _optional(_map(_NUMBER)),
-        "ground": _optional(_map(_POINT)),
-        "joints": _optional(_map(_POINT)),
-        "parts": Field(_list("part")),
+        "lengths": _optional(kind.named(kind.NUMBER)),
+        "ground": _optional(kind.named(_POINT)),
+        "joints": _optional(kind.named(_POINT)),
+        "parts": Field(kind.tables("part")),
     },
     "analysis": {
-        "end": _optional(_CONSTANT),
-        "points": _optional({"type": "integer", "minimum": 1, "maximum": MOST_POINTS}),
+        "end": _optional(kind.CONSTANT),
+        "points": _optional(kind.whole(1, MOST_POINTS)),
     },
-    "parameter": {
-        "name": Field(_NAME),
-        "default": Field(_CONSTANT),
-        "unit": _optional(_TEXT),
-        "range": _optional(_POINT),
-    },
-    "body": {
-        "name": Field(_NAME),
-        "guess": _optional(_TRIPLE),
-        "outline": _optional(_array(_POINT, 3)),
-        "mass": _optional(_EXPRESSION),
-        "inertia": _optional(_EXPRESSION),
-        "centre": _optional(_POINT),
-        "density": _optional(_EXPRESSION),
-        "thickness": _optional(_EXPRESSION),
-    },
-    "point": {"name": Field(_NAME), "body": Field(_NAME), "local": Field(_POINT)},
-    "output": {
-        "name": Field(_NAME),
-        "expression": Field(_EXPRESSION),
-        "unit": _optional(_TEXT),
-    },
-    "coordinate": {"name": Field(_NAME), "guess": _optional(_EXPRESSION)},
     "profile": {
         "angles": Field(_NUMBERS),
         "radii": Field(_NUMBERS),
         "smoothness": Field({"const": SMOOTHNESS}),
     },
     "sequence": {
-        "points": Field(_array(_POINT, 2)),
-        "law": _optional(_any_of(_LAW, _array(_LAW))),
-        "ramp": _optional(_EXPRESSION),
+        "points": Field(kind.array(_POINT, 2)),
+        "law": _optional(kind.any_of(_LAW, kind.array(_LAW))),
+        "ramp": _optional(kind.EXPRESSION),
     },
     "table": {
         "times": Field(_VALUES),
         "values": Field(_VALUES),
         "velocities": _optional({**_POINT}),
-        "over": _optional(_EXPRESSION),
+        "over": _optional(kind.EXPRESSION),
     },
     "Equation": {
         "type": Field({"const": "Equation"}),
-        "name": Field(_NAME),
-        "expressions": Field(_array(_EXPRESSION, 1)),
-        "corners": _optional(_CORNERS),
+        "name": Field(kind.NAME),
+        "expressions": Field(kind.array(kind.EXPRESSION, 1)),
+        "corners": _optional(kind.FLAG),
     },
 }
 """Fields of the file itself, of its tables, and of a free equation."""
 
-IN_SPACE: Mapping[str, Mapping[str, Field]] = {
+IN_SPACE: dict[str, Mapping[str, Field]] = {
     "model": {
         **FIELDS["model"],
         "space": Field({"const": SPACE}),
-        "sketch": _optional(_ref("spatial_sketch")),
-        "bodies": _optional(_list("spatial_body")),
-        "constraints": _optional(_list("spatial_constraint")),
-        "points": _optional(_list("spatial_point")),
+        "sketch": _optional(kind.ref("spatial_sketch")),
+        "bodies": _optional(kind.tables("spatial_body")),
+        "constraints": _optional(kind.tables("spatial_constraint")),
+        "points": _optional(kind.tables("spatial_point")),
         "gravity": _optional(_TRIPLE),
-        "loads": _optional(_list("spatial_load")),
+        "loads": _optional(kind.tables("spatial_load")),
     },
     "body": {
-        "name": Field(_NAME),
-        "position": _optional(_TRIPLE),
-        "orientation": _optional(_any_of(_components(4), {**_TRIPLE, "items": _TRIPLE})),
-        **{key: _optional(_TRIPLE) for key in ("axis", "x", "y", "z")},
-        "angle": _optional(_EXPRESSION),
-        "mass": _optional(_EXPRESSION),
-        "inertia": _optional(_any_of(_TRIPLE, {**_TRIPLE, "items": _TRIPLE})),
-        "centre": _optional(_TRIPLE),
+        "name": Field(kind.NAME),
+        "position": _optional(_PLACE),
+        "orientation": _optional(
+            kind.any_of(kind.components(4, words="[e0, e1, e2, e3]"), _MATRIX)
+        ),
+        **{key: _optional(_PLACE) for key in ("axis", "x", "y", "z")},
+        "angle": _optional(kind.EXPRESSION),
+        "mass": FIELDS["body"]["mass"],
+        "inertia": _optional(
+            kind.any_of(kind.components(3, words="[J_xi, J_eta, J_zeta]"), _MATRIX)
+        ),
+        "centre": _optional(_LOCAL),
     },
-    "point": {**FIELDS["point"], "local": Field(_TRIPLE)},
+    "point": {**FIELDS["point"], "local": Field(_LOCAL)},
     "sketch": {
         **FIELDS["sketch"],
-        **{name: _optional(_map(_TRIPLE)) for name in ("ground", "joints", "hinges")},
-        "parts": Field(_list("spatial_part")),
+        **{name: _optional(kind.named(_TRIPLE)) for name in ("ground", "joints", "hinges")},
+        "parts": Field(kind.tables("spatial_part")),
     },
 }
 """Fields of what is different in a file with ``space = 3``."""
@@ -250,126 +151,97 @@ IN_SPACE: Mapping[str, Mapping[str, Field]] = {
 
 def fields_of(table: str, count: int = PLANE) -> Mapping[str, Field]:
     """Return the fields of a table of a file in the plane, or in space."""
-    return IN_SPACE.get(table, FIELDS[table]) if count == SPACE else FIELDS[table]
+    return {PLANE: FIELDS, SPACE: FIELDS | IN_SPACE}[count][table]
 
 
-_MOTIONS = [_ref("sequence"), _ref("table")]
-VALUE: dict[str, Any] = _any_of(_EXPRESSION, *_MOTIONS)
+_MOTIONS = [kind.ref("sequence"), kind.ref("table")]
+VALUE: dict[str, Any] = kind.any_of(kind.EXPRESSION, *_MOTIONS)
 
 
 def _line(place: Mapping[str, Any]) -> dict[str, Field]:
     """Return the fields of a guide, through two joints or along a direction, and of its link."""
-    along = Field(_any_of(_TEXT, place))
-    return {"along": along, "on": _optional(_NAME)}
+    along = Field(kind.any_of(kind.TEXT, place))
+    return {"along": along, "on": _optional(kind.NAME)}
 
-
-_WEIGHT: Mapping[str, Field] = {"weight": _optional(_CONSTANT)}
-_PASSING: Mapping[str, Field] = {
-    "times": _optional(_array(_CONSTANT)),
-    **_WEIGHT,
-    "within": _optional(_CONSTANT),
-    "between": _optional(_PAIR),
-}
-_ROWS: dict[str, Any] = _array(_array(_CONSTANT) | {"description": "a list of numbers"}) | {
-    "description": "a list of lists of numbers"
-}
 
 TARGETS: Mapping[str, Mapping[str, Field]] = {
-    "path": {"path": Field(_TEXT), "points": Field(_ROWS), **_PASSING},
-    "value": {
-        "value": Field(_TEXT), "values": Field(_array(_CONSTANT)), **_PASSING,
-    },
-    "pose": {
-        "pose": Field(_TEXT), "poses": Field(_ROWS),
-        "angle_weight": _optional(_CONSTANT), **_PASSING,
-    },
-    "time_ratio": {
-        "time_ratio": Field(_TEXT), "ratio": Field(_CONSTANT), **_WEIGHT,
-        "within": _optional(_CONSTANT),
-    },
-    "limit": {
-        "limit": Field(_TEXT),
-        "least": _optional(_CONSTANT),
-        "most": _optional(_CONSTANT),
-        "title": _optional(_TEXT),
-    },
-    "moves": {"moves": Field({"const": True})},
-}  # fmt: skip
+    name: declared_fields(item) for name, item in tasks.TARGETS.items()
+}
 """Targets of a fit: the functions of `kc.targets`, and their arguments."""
 
 PARTS: Mapping[str, Mapping[str, Field]] = {
     "link": {
-        "link": Field(_NAME),
-        "joints": Field(_TEXT),
-        "length": _optional(_EXPRESSION),
+        "link": Field(kind.NAME),
+        "joints": Field(kind.TEXT),
+        "length": _optional(kind.EXPRESSION),
     },
-    "wheel": {"wheel": Field(_NAME), "joint": Field(_NAME)},
-    "slider": {"slider": Field(_NAME), "joints": Field(_TEXT), **_line(_POINT)},
-    "slot": {"slot": Field(_NAME), **_line(_POINT)},
+    "wheel": {"wheel": Field(kind.NAME), "joint": Field(kind.NAME)},
+    "slider": {"slider": Field(kind.NAME), "joints": Field(kind.TEXT), **_line(_POINT)},
+    "slot": {"slot": Field(kind.NAME), **_line(_POINT)},
     "gear": {
-        "gear": Field(_NAME),
-        "i": Field(_NAME), "centre_i": Field(_NAME), "radius_i": Field(_EXPRESSION),
-        "j": Field(_NAME), "centre_j": Field(_NAME), "radius_j": Field(_EXPRESSION),
+        "gear": Field(kind.NAME),
+        "i": Field(kind.NAME), "centre_i": Field(kind.NAME), "radius_i": Field(kind.EXPRESSION),
+        "j": Field(kind.NAME), "centre_j": Field(kind.NAME), "radius_j": Field(kind.EXPRESSION),
     },
     "drive": {
-        "drive": Field(_TEXT),
+        "drive": Field(kind.TEXT),
         "value": Field(VALUE),
-        "against": _optional(_NAME),
+        "against": _optional(kind.NAME),
     },
 }  # fmt: skip
 """Parts of a drawing: the methods of `Sketch`, and their arguments in order."""
 
 SPATIAL_PARTS: Mapping[str, Mapping[str, Field]] = {
-    "link": {"link": Field(_NAME), "joints": Field(_TEXT)},
-    "slider": {"slider": Field(_NAME), "joints": Field(_TEXT), **_line(_TRIPLE)},
+    "link": {"link": Field(kind.NAME), "joints": Field(kind.TEXT)},
+    "slider": {"slider": Field(kind.NAME), "joints": Field(kind.TEXT), **_line(_TRIPLE)},
     "rod": {
-        "rod": Field(_NAME), "joints": Field(_TEXT), "length": _optional(VALUE),
+        "rod": Field(kind.NAME), "joints": Field(kind.TEXT), "length": _optional(VALUE),
     },
-    "drive": {"drive": Field(_TEXT), "value": Field(VALUE)},
+    "drive": {"drive": Field(kind.TEXT), "value": Field(VALUE)},
 }  # fmt: skip
 """Those of `spatial.Sketch`."""
 
 
 def parts_of(count: int) -> Mapping[str, Mapping[str, Field]]:
     """Return the parts of a drawing in the plane, or in space."""
-    return SPATIAL_PARTS if count == SPACE else PARTS
+    return {PLANE: PARTS, SPACE: SPATIAL_PARTS}[count]
 
 
 _KINDS: Mapping[Kind, Mapping[str, Any]] = {
     Kind.VALUE: VALUE,
     Kind.LOAD: VALUE,
     Kind.DISTANCE: VALUE,
-    Kind.BODY: _NAME,
-    Kind.PROFILE: _any_of(_EXPRESSION, _ref("profile")),
+    Kind.BODY: kind.NAME,
+    Kind.PROFILE: kind.any_of(kind.EXPRESSION, kind.ref("profile")),
 }
 
 
-def _kind(kind: Kind, count: int) -> Mapping[str, Any]:
+def _kind(item: Kind, count: int) -> Mapping[str, Any]:
     """Return the schema of an argument, whose points have `count` components."""
-    if kind in (Kind.POINT, Kind.AXIS):
-        return _components(count)
-    if kind is Kind.LOADS:
-        return {"type": "array", "items": VALUE, "minItems": count, "maxItems": count}
-    return _KINDS.get(kind, _EXPRESSION)
+    if item in (Kind.POINT, Kind.AXIS):
+        return kind.components(count)
+    if item is Kind.LOADS:
+        return kind.components(count, VALUE)
+    return _KINDS.get(item, kind.EXPRESSION)
 
 
 def constraint_fields(constraint: type[Constraint]) -> dict[str, Field]:
     """Return the fields of a constraint type: its arguments, and what drivers and cams have."""
-    found = {"type": Field({"const": constraint.__name__}), "name": Field(_NAME)}
+    found = {"type": Field({"const": constraint.__name__}), "name": Field(kind.NAME)}
     for name, item in constraint.arguments().items():
         found[name] = Field(_kind(item.kind, len(constraint.bodies.axes)))
     if any(item.symbol == "C" for item in constraint.arguments().values()):
-        found["corners"] = _optional(_CORNERS)
+        found["corners"] = _optional(kind.FLAG)
     if constraint.contacts:
-        guesses = _array(_EXPRESSION, len(constraint.contacts))
-        found["guess"] = _optional(_any_of(_EXPRESSION, guesses))
+        guesses = kind.array(kind.EXPRESSION, len(constraint.contacts))
+        found["guess"] = _optional(kind.any_of(kind.EXPRESSION, guesses))
     return found
 
 
 def load_fields(load: type[Load]) -> dict[str, Field]:
     """Return the fields of a type of load: its arguments, those with a default left out or not."""
     given = {item.name: item for item in fields(load)}
-    found = {"type": Field({"const": load.__name__}), "name": Field(_NAME)}
+    found = {"type": Field({"const": load.__name__}), "name": Field(kind.NAME)}
     for name, item in load.arguments().items():
         schema = _kind(item.kind, len(load.bodies.axes))
         found[name] = Field(schema, is_required=given[name].default is MISSING)
@@ -385,14 +257,14 @@ def model_schema() -> dict[str, Any]:
     in_space = {f"spatial_{name}": _object(IN_SPACE[name]) for name in IN_SPACE if name != "model"}
     parts = [_object(item) for item in PARTS.values()]
     # Lengths and places of a link are called as its joints are.
-    parts[0]["additionalProperties"] = _any_of(_EXPRESSION, _POINT)
+    parts[0]["additionalProperties"] = kind.any_of(kind.EXPRESSION, _POINT)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"Mechanism for kincompile, format {VERSION}",
         "type": "object",
         "if": {"properties": {"space": {"const": SPACE}}, "required": ["space"]},
-        "then": _ref("in_space"),
-        "else": _ref("in_the_plane"),
+        "then": kind.ref("in_space"),
+        "else": kind.ref("in_the_plane"),
         "$defs": {
             "in_the_plane": _object(FIELDS["model"]),
             "in_space": _object(IN_SPACE["model"]),
@@ -430,7 +302,10 @@ def _constraints(count: int) -> list[dict[str, Any]]:
 def _object(fields: Mapping[str, Field]) -> dict[str, Any]:
     return {
         "type": "object",
-        "properties": {name: item.schema for name, item in fields.items()},
+        "properties": {
+            name: {**({"description": item.words} if item.words else {}), **item.schema}
+            for name, item in fields.items()
+        },
         "required": [name for name, item in fields.items() if item.is_required],
         "additionalProperties": False,
     }

@@ -18,7 +18,7 @@ nothing in it is run. All problems are reported together, each with line and fie
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import sympy
 
@@ -37,7 +37,7 @@ from kincompile.files.file_format import (
     load_fields,
 )
 from kincompile.model.arguments import Kind
-from kincompile.model.bodies import Parameter
+from kincompile.model.bodies import Coordinate, Parameter
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import alpha, t
 from kincompile.model.outputs import Output
@@ -109,7 +109,7 @@ class _ModelReader(BodyReader):
         content = {
             "parameters": drawn.parameters or parameters,
             "bodies": [*drawn.bodies, *(item for item in bodies if item)],
-            "coordinates": dict(item for item in free if item),
+            "coordinates": {item.name: item.guess for item in free if item},
             "constraints": [*drawn.constraints, *(item for item in constraints if item)],
             "outputs": [*drawn.outputs, *(item for item in (*points, *outputs) if item)],
             "loads": [item for item in loads if item],
@@ -122,7 +122,7 @@ class _ModelReader(BodyReader):
         """Return the tables of commands, whose fields are those of the format."""
         found = {key: data[key] for key in TASKS if key in data}
         for key, table in found.items():
-            self.fits(table, FIELDS["model"][key].schema, (key,))
+            self.table(table, key, (key,))
         return found
 
     def _is_model(self, data: Any) -> bool:
@@ -201,37 +201,29 @@ class _ModelReader(BodyReader):
     def _parameter(self, address: Address, row: Row) -> Parameter | None:
         complete = self.has_fields(address, row, FIELDS["parameter"])
         name = self.name(row, address, "a parameter")
-        default = self.constant(row.get("default", 1.0), (*address, "default"), {})
-        unit = self.unit(row.get("unit", ""), (*address, "unit"), f"parameter {name!r}")
+        given = self.values(row, FIELDS["parameter"], address, {})
         if name:
             self.names[name] = sympy.Symbol(name)
             self.remember(f"parameter {name!r}", address)
-        limits, known = None, len(self.problems)
-        if "range" in row:
-            limits = self.expressions(row["range"], (*address, "range"), {}, "[least, greatest]", 2)
-            limits = limits if len(self.problems) == known else None
-        # The checks of the system make numbers of them.
-        item = Parameter(name, cast("float", default), unit, cast("Any", limits))
-        return item if self.is_free(name, address) and complete else None
+        is_new = self.is_free(name, address)
+        return Parameter(name, **{"default": 1.0, **given}) if is_new and complete else None
 
-    def _coordinate(self, address: Address, row: Row) -> tuple[str, float | sympy.Expr] | None:
+    def _coordinate(self, address: Address, row: Row) -> Coordinate | None:
         self.has_fields(address, row, FIELDS["coordinate"])
         name = self.name(row, address, "a coordinate")
-        guess = self.expression(row.get("guess", 0.0), (*address, "guess"), self.names)
+        given = self.values(row, FIELDS["coordinate"], address, self.names)
         if name:
             self.names[name] = sympy.Symbol(name)
             self.remember(f"guess of {name}", address)
-        return (name, guess) if self.is_free(name, address) else None
+        return Coordinate(name, **given) if self.is_free(name, address) else None
 
     def _output(self, address: Address, row: Row) -> Output | None:
         complete = self.has_fields(address, row, FIELDS["output"])
         name = self.name(row, address, "an output")
         self.remember(f"output {name!r}", address)
-        unit = self.unit(row.get("unit", ""), (*address, "unit"), f"output {name!r}")
-        given = row.get("expression", 0)
-        found = self.expression(given, (*address, "expression"), self._moving_names())
+        given = self.values(row, FIELDS["output"], address, self._moving_names())
         is_new = self.is_free(name, address, "output")
-        return Output(name, found, unit) if is_new and complete else None
+        return Output(name, **{"expression": 0, **given}) if is_new and complete else None
 
     def _moving_names(self) -> dict[str, sympy.Expr]:
         """Return the names that may occur in an output or a load: those of rates too."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import sympy
 
 from kincompile.errors import ModelError
-from kincompile.files.dimensions import PLANE, SPACE, Dimensions, dimensions
+from kincompile.files.dimensions import PLANE, Dimensions, dimensions
 from kincompile.files.file_fields import FieldReader
 from kincompile.files.file_format import FIELDS, MOST_DRAWN, MOST_JOINTS, VALUE, fields_of, parts_of
 from kincompile.model import motion
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from kincompile.files.data_lines import Address
     from kincompile.files.data_text import Document
-    from kincompile.files.file_format import Field
     from kincompile.model.bodies import Parameter
+    from kincompile.model.declared import Field
     from kincompile.model.mechanism import Mechanism
 
 Row = dict[str, Any]
@@ -49,12 +49,13 @@ class SketchReader(FieldReader):
         if not isinstance(given, dict):
             self.problem(PLACE, f"expected a table, not {shown(given)}")
             return self.words.mechanism(name)
-        self.has_fields(PLACE, given, fields_of("sketch", self.words.count))
+        known = fields_of("sketch", self.words.count)
+        self.has_fields(PLACE, given, known)
         for key, address, value in self._named(given, "lengths"):
             sketch.length(key, self.number(value, address))
             self.names[key] = sympy.Symbol(key)
             self.remember(f"parameter {key!r}", address)
-        for section in ("ground", "joints", *(("hinges",) if self.words.count == SPACE else ())):
+        for section in (item for item in ("ground", "joints", "hinges") if item in known):
             for key, address, value in self._named(given, section):
                 getattr(sketch, section)(**{key: self._place(value, address)})
                 self.remember(f"{'hinge' if section == 'hinges' else 'joint'} {key!r}", address)
@@ -96,7 +97,7 @@ class SketchReader(FieldReader):
         return entries
 
     def _place(self, value: Any, address: Address) -> tuple[Any, ...]:
-        what = "[x, y]" if self.words.count == PLANE else "[x, y, z]"
+        what = f"[{', '.join('xyz'[: self.words.count])}]"
         return tuple(self.expressions(value, address, self.names, what, self.words.count))
 
     def _part(self, sketch: Any, address: Address, row: Any) -> None:
@@ -108,7 +109,7 @@ class SketchReader(FieldReader):
             return
         fields, before = parts[kind], len(self.problems)
         # What else a link of the plane has are lengths and places, by the names of its joints.
-        is_open = kind == "link" and self.words.count == PLANE
+        is_open = kind == "link" and "length" in fields
         self.has_fields(
             address, {key: row[key] for key in row if not is_open or key in fields}, fields
         )

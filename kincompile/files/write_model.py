@@ -9,14 +9,16 @@ import sympy
 from sympy.printing.str import StrPrinter
 
 from kincompile.errors import ModelError
-from kincompile.files.dimensions import SPACE
+from kincompile.files.dimensions import PLANE, SPACE
 from kincompile.files.file_format import SMOOTHNESS, TASKS, VERSION, load_fields
 from kincompile.model.arguments import Kind
+from kincompile.model.bodies import Body
 from kincompile.model.constraint import CamConstraint, Constraint, Element
+from kincompile.model.declared import declared_fields
 from kincompile.model.directions import VectorFunction
 from kincompile.model.expressions import as_expression, as_sympy, deg, t
 from kincompile.model.laws import TableLaw
-from kincompile.model.outputs import ResolvedOutput
+from kincompile.model.outputs import Output, ResolvedOutput
 from kincompile.model.resolve import Joint
 from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import model_text
@@ -24,7 +26,7 @@ from kincompile.model.text_views import model_text
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from kincompile.model.bodies import Body, Coordinate, Parameter
+    from kincompile.model.bodies import Coordinate
     from kincompile.model.expressions import Scalar
     from kincompile.model.laws import MotionLaw
     from kincompile.model.resolve import FreeEquation
@@ -42,15 +44,10 @@ def _model_text(system: ConstraintSystem, form: str) -> str:
 def model_data(system: ConstraintSystem) -> dict[str, Any]:
     """Return a system as the values of a model file."""
     sections = {
-        "parameters": [_parameter(item) for item in system.parameters],
+        "parameters": [row(item) for item in system.parameters],
         "bodies": [_body(item) for item in system.bodies],
-        "coordinates": [
-            {"name": item.name, "guess": item.guess} for item in _free_coordinates(system)
-        ],
-        "points": [
-            {"name": item.name, "body": item.body.name, "local": [value(x) for x in item.local]}
-            for item in system.body_points
-        ],
+        "coordinates": [row(item) for item in _free_coordinates(system)],
+        "points": [row(item) for item in system.body_points],
         "outputs": _outputs(system),
         "loads": [_load(item) for item in system.loads if type(item.written).__name__ != "Mass"],
         "constraints": [_constraint(item) for item in system.constraints if not _is_own(item)],
@@ -73,10 +70,29 @@ def _end(system: ConstraintSystem) -> int | float | str:
     return value(given) if isinstance(given, sympy.Expr) else float(given)
 
 
-def _parameter(item: Parameter) -> dict[str, Any]:
-    row: dict[str, Any] = {"name": item.name, "default": item.default}
-    row |= {"unit": item.unit} if item.unit else {}
-    return row | ({"range": list(item.range)} if item.range else {})
+def row(item: Any) -> dict[str, Any]:
+    """Return what is declared as the fields of its table; defaults are left out."""
+    found = {}
+    cls: type = type(item)
+    for name, field in declared_fields(cls).items():
+        given = getattr(item, field.attribute)
+        if field.is_written or not _is_same(given, field.default):
+            found[name] = data(given)
+    return found
+
+
+def _is_same(given: Any, default: Any) -> bool:
+    """Return whether a value is a default, a list entry by entry."""
+    if default is None or isinstance(default, str):
+        return bool(given == default)
+    return len(given) == len(default) and all(x == y for x, y in zip(given, default, strict=True))
+
+
+def data(given: Any) -> Any:
+    """Return a value as a file has it: a name, a list, a number or a formula."""
+    if isinstance(given, str | Body):
+        return getattr(given, "name", given)
+    return [data(item) for item in given] if hasattr(given, "__len__") else value(given)
 
 
 def _is_own(item: Joint | FreeEquation) -> bool:
@@ -85,29 +101,12 @@ def _is_own(item: Joint | FreeEquation) -> bool:
 
 
 def _body(item: Body) -> dict[str, Any]:
-    guess = [value(number) for number in item.guess]
-    row: dict[str, Any] = {"name": item.name}
-    if len(item.kind.axes) == SPACE:
-        row |= {"position": guess[:SPACE], "orientation": guess[SPACE:]}
-        row |= {} if item.mass is None else {"mass": value(item.mass)}
-        row |= {} if item.inertia is None else {"inertia": _nested(item.inertia)}
-        return _with_centre(row, item)
-    row["guess"] = guess
-    corners = [[value(number) for number in corner] for corner in item.outline]
-    row |= {"outline": corners} if corners else {}
-    given = {key: getattr(item, key) for key in ("mass", "inertia", "density", "thickness")}
-    row |= {key: value(number) for key, number in given.items() if number is not None}
-    return _with_centre(row, item)
-
-
-def _with_centre(row: dict[str, Any], item: Body) -> dict[str, Any]:
-    """Return a body's table with its centre of mass, where that is not its origin."""
-    centre = [value(number) for number in item.centre]
-    return {**row, "centre": centre} if any(number != 0 for number in centre) else row
-
-
-def _nested(given: Any) -> list[Any]:
-    return [_nested(item) if hasattr(item, "__len__") else value(item) for item in given]
+    """Return a body; one in space has a place and an orientation in place of its guess."""
+    found = row(item)
+    given, size = found["guess"], len(item.kind.axes)
+    parts = {"position": given[:size], "orientation": given[size:]}
+    placed = {PLANE: {"guess": given}, SPACE: parts}[size]
+    return {"name": item.name, **placed, **{k: x for k, x in found.items() if k != "guess"}}
 
 
 def _outputs(system: ConstraintSystem) -> list[dict[str, Any]]:
@@ -122,8 +121,7 @@ def _outputs(system: ConstraintSystem) -> list[dict[str, Any]]:
         if not isinstance(item, ResolvedOutput):
             continue
         expression = as_sympy(item.written.expression).xreplace(named)
-        row = {"name": item.name, "expression": value(expression)}
-        rows.append({**row, "unit": item.unit} if item.unit else row)
+        rows.append(row(Output(item.name, expression, item.unit)))
     return rows
 
 

@@ -11,6 +11,8 @@ import sympy
 
 from kincompile.calculus.symbols import Frame, PlaneFrame
 from kincompile.html import Shown
+from kincompile.model import declared as kinds
+from kincompile.model.declared import declared, given
 from kincompile.model.expressions import NotAnExpressionError, as_expression, number_in
 from kincompile.names import rate
 
@@ -66,7 +68,7 @@ PLANAR = BodyKind(
 )
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared(slots=True, repr=False)
 class Body(Shown):
     """A planar rigid body with coordinates x, y [length] of its origin and angle phi [rad].
 
@@ -74,16 +76,32 @@ class Body(Shown):
     its own frame. Where it has a mass, that has an inertia about its centre, or is a plate's.
     """
 
-    name: str
-    guess: Scalars = (0, 0, 0)
-    outline: Sequence[Scalars] = ()
+    name: str = given(kinds.NAME, "Name of the body.")
+    guess: Scalars = given(
+        kinds.components(3, words="[x, y, phi]"), "Start values for Newton's method.",
+        default=(0, 0, 0), always=True,
+    )  # fmt: skip
+    outline: Sequence[Scalars] = given(
+        kinds.array(kinds.components(2, words="[xi, eta]"), 3)
+        | {"description": "a list of corners [xi, eta], 3 or more"},
+        "A polygon in the body's frame, for pictures.", default=(), unit="length",
+    )  # fmt: skip
     is_ground: bool = field(default=False, kw_only=True)
     kind: BodyKind = field(default=PLANAR, kw_only=True, repr=False)
-    mass: Scalar | None = field(default=None, kw_only=True)
-    inertia: Any = field(default=None, kw_only=True)
-    centre: Scalars = field(default=(0, 0), kw_only=True)
-    density: Scalar | None = field(default=None, kw_only=True)
-    thickness: Scalar | None = field(default=None, kw_only=True)
+    mass: Scalar | None = given(kinds.EXPRESSION, "Its mass.", default=None, kw_only=True)
+    inertia: Any = given(
+        kinds.EXPRESSION, "Its inertia about the centre of mass.", default=None, kw_only=True
+    )
+    centre: Scalars = given(
+        kinds.components(2, words="[xi, eta]"), "Centre of mass in the body's frame.",
+        default=(0, 0), unit="length", kw_only=True,
+    )  # fmt: skip
+    density: Scalar | None = given(
+        kinds.EXPRESSION, "Density of a plate with its outline.", default=None, kw_only=True
+    )
+    thickness: Scalar | None = given(
+        kinds.EXPRESSION, "Thickness of that plate.", default=None, unit="length", kw_only=True
+    )
     # What is wrong with its guess, as it was given.
     problem: str = field(default="", kw_only=True, repr=False)
 
@@ -162,18 +180,21 @@ def body_columns(bodies: Sequence[Body]) -> tuple[range, ...]:
     return tuple(range(first, end) for first, end in pairwise(ends))
 
 
-@dataclass(frozen=True, slots=True)
+@declared(slots=True)
 class Parameter:
     """A number that may change at run time without recompiling.
 
     `range` are the ends of the slider that a page has for it; None for half and double the default.
     """
 
-    name: str
-    default: float | None
-    unit: str = ""
+    name: str = given(kinds.NAME, "Name of the parameter.")
+    default: float | None = given(kinds.CONSTANT, "Its value where none is given at run time.")
+    unit: str = given(kinds.UNIT, "Its unit, for documentation.", default="")
     # Not of the code, whose fingerprint is that of what is shown here.
-    range: tuple[float, float] | None = field(default=None, repr=False)
+    range: tuple[float, float] | None = given(
+        kinds.components(2, words="[least, greatest]"), "Its values on the slider of a page.",
+        default=None, is_shown=False,
+    )  # fmt: skip
 
 
 def default_values(parameters: Iterable[Parameter]) -> dict[str, float]:
@@ -187,10 +208,12 @@ def default_values(parameters: Iterable[Parameter]) -> dict[str, float]:
     return found
 
 
-@dataclass(frozen=True, slots=True)
+@declared(slots=True)
 class Coordinate:
     """A generalised coordinate: its name, the guess where Newton starts, and its unit."""
 
-    name: str
-    guess: float
+    name: str = given(kinds.NAME, "Name of the coordinate.")
+    guess: float = given(
+        kinds.EXPRESSION, "Start value for Newton's method.", default=0.0, always=True
+    )
     unit: str = ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from kincompile.model.expressions import Scalar, Scalars
 
 Item = TypeVar("Item", bound=Element | Equation)
+Model = TypeVar("Model", bound="Mechanism")
 
 
 class Mechanism(MatrixViews, TextViews):
@@ -242,6 +244,14 @@ class Mechanism(MatrixViews, TextViews):
         """Return name and sizes."""
         sizes = f"{len(self.bodies)} bodies, {len(self.constraints)} constraints"
         return f"<Mechanism {self.name!r}: {sizes}>"
+
+
+def changed(model: Model, **parts: Any) -> Model:
+    """Return a mechanism with other parts, ``bodies=[...]``; it keeps all others."""
+    made = copy.copy(model)
+    for name, part in parts.items():
+        setattr(made, name, part)
+    return made
 
 
 def system_of(model: Mechanism | ConstraintSystem) -> ConstraintSystem:

@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, TypeAlias, cast
 import sympy
 
 from kincompile.errors import ModelError
+from kincompile.model import declared as kinds
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import Body
+from kincompile.model.declared import declared, given
 from kincompile.model.directions import angle_between, length_of, turning
 from kincompile.model.expressions import (
     NotAnExpressionError,
@@ -44,13 +46,15 @@ if TYPE_CHECKING:
     from kincompile.model.scope import Scope
 
 
-@dataclass(frozen=True, slots=True)
+@declared(slots=True)
 class Output:
     """An output as it was written; made by `Mechanism.output`. The unit None is that of lengths."""
 
-    name: str
-    expression: Scalar
-    unit: str | None = ""
+    name: str = given(kinds.NAME, "Name of the output.")
+    expression: Scalar = given(
+        kinds.EXPRESSION, "What it is, in coordinates, points, rates, parameters and t."
+    )
+    unit: str | None = given(kinds.UNIT, "Its unit.", default="")
 
 
 @dataclass(frozen=True, slots=True)

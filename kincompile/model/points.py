@@ -13,6 +13,8 @@ from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import VectorSymbol
 from kincompile.calculus.symbols import i
 from kincompile.calculus.template import Template
+from kincompile.model import declared as kinds
+from kincompile.model.declared import declared, given
 from kincompile.model.expressions import as_sympy
 from kincompile.model.symbolic import SymbolicEnvironment
 
@@ -190,7 +192,7 @@ class PlacedPoint(Observed):
         return expansion.components(self.template.Phi[0])
 
 
-@dataclass(frozen=True, slots=True)
+@declared(slots=True)
 class BodyPoint:
     """A named point P of a body, at (xi, eta) in its frame [length]; made by `Mechanism.point`.
 
@@ -199,9 +201,11 @@ class BodyPoint:
     too, and their rates.
     """
 
-    name: str
-    body: Body
-    local: Scalars
+    name: str = given(kinds.NAME, "Name of the point.")
+    body: Body = given(kinds.NAME, "Name of its body.")
+    local: Scalars = given(
+        kinds.components(2, words="[xi, eta]"), "Its place in the body's frame.", unit="length"
+    )
 
     functions: ClassVar[tuple[type[PointCoordinate], ...]] = (point_x, point_y)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from kincompile.criteria import LONGEST_P
 from kincompile.errors import InputError
-from kincompile.names import LARGEST_SEED, column_name, listed, shown, suggestion
+from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.engine.code import Compiled, code_of, require_square
 
 if TYPE_CHECKING:
@@ -39,13 +39,6 @@ def mapping_of(given: Any, what: str) -> Mapping[str, Any]:
     if given is not None and not isinstance(given, Mapping):
         raise InputError(f"{what} is {given!r}: give values by name, such as {{'a': 0.1}}.")
     return given or {}
-
-
-def require_seed(seed: Any) -> None:
-    """Check that a seed is a whole number that every generator of random numbers takes."""
-    is_whole = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
-    if not is_whole or not 0 <= seed <= LARGEST_SEED:
-        raise InputError(f"seed is {shown(seed)}: give a whole number from 0 to {LARGEST_SEED:,}.")
 
 
 SMALLEST_GRID = 32

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sized
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 from kincompile.calculus.space import SpatialFrame
 from kincompile.errors import ModelError
+from kincompile.model import declared as kinds
 from kincompile.model.bodies import Body, BodyKind
+from kincompile.model.declared import declared, given
 from kincompile.names import shown
 from kincompile.space.points import SpatialPoint
 
@@ -49,15 +51,21 @@ SPATIAL = BodyKind(
 )
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@declared(slots=True, repr=False)
 class SpatialBody(Body):
     """A rigid body in space: x, y, z [length] of its origin and Euler parameters e0 to e3.
 
     Made by `spatial.Mechanism.body`; the ground is `spatial.Mechanism.ground`.
     """
 
-    guess: Scalars = SPATIAL.ground
-    centre: Scalars = field(default=(0, 0, 0), kw_only=True)
+    guess: Scalars = given(
+        kinds.components(7), "Start values for Newton's method.", default=SPATIAL.ground,
+        always=True,
+    )  # fmt: skip
+    centre: Scalars = given(
+        kinds.components(3), "Centre of mass in the body's frame.", default=(0, 0, 0),
+        unit="length", kw_only=True,
+    )  # fmt: skip
     kind: BodyKind = field(default=SPATIAL, kw_only=True, repr=False)
 
     @property

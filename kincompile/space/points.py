@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, cast
 
 from kincompile.calculus.space import i
+from kincompile.model.declared import declared
 from kincompile.model.points import BodyPoint, PointCoordinate, rate
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class point_z(SpatialCoordinate):  # noqa: N801
     row = 2
 
 
-@dataclass(frozen=True, slots=True)
+@declared(slots=True)
 class SpatialPoint(BodyPoint):
     """A named point P of a body, at (xi, eta, zeta) in its frame [length]; made by `point`.
 

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.errors import InputError
-from kincompile.files.sweep_table import Span
+from kincompile.model.tasks import Span
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from kincompile.files.sweep_table import SweepTable
+    from kincompile.model.tasks import Sweep
     from kincompile.runtime.engine.code import Array
 
 
-def values_of(table: SweepTable) -> dict[str, Array]:
+def values_of(table: Sweep) -> dict[str, Array]:
     """Return the values of each parameter of a table.
 
     Spans without a count are filled by the Halton sequence, whose points are the same on every

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 
 import kincompile as kc
+from docs.builders import fields as tables
+from docs.builders.places import DOCS
 from kincompile.files.file_format import FIELDS, IN_SPACE, PARTS
 from kincompile.files.safe_expressions import FUNCTIONS
 
@@ -43,15 +45,21 @@ def test_that_the_file_in_space_moves(tmp_path):
 
 
 def test_that_each_table_has_its_fields():
-    tables = ("model", "analysis", "parameter", "body", "coordinate", "point", "output", "sketch")
+    names = ("model", "analysis", "parameter", "body", "coordinate", "point", "output", "sketch")
     given = (
-        *(FIELDS[table] for table in (*tables, "sweep", "span")),
+        *(FIELDS[table] for table in (*names, "sweep", "span")),
         *IN_SPACE.values(),
         *PARTS.values(),
     )
     for fields in given:
         for field in fields:
             assert f"`{field}`" in PAGE
+
+
+def test_that_the_tables_of_commands_follow_from_their_declarations(request):
+    if request.config.getoption("--update-goldens"):
+        (DOCS / tables.PAGE).write_text(tables.page(), encoding="utf-8")
+    assert tables.page() == PAGE, "python -m docs.builders fields writes it anew"
 
 
 def test_that_all_functions_are_named():

@@ -57,6 +57,17 @@ def test_that_a_word_counts_as_a_name_and_in_a_text_but_not_in_a_docstring(budge
     assert not budget.names_it(module, "comment")
 
 
+def test_that_a_test_for_the_dimension_is_a_branch_on_space(budget, tmp_path):
+    path = tmp_path / "module.py"
+    path.write_text(
+        "if len(body.kind.axes) == 3: pass\n"
+        "found = 1 if shapes.is_spatial else 2\n"
+        "rows = [x for x in y if x.frame.size > PLANE]\n"
+        "axes = kind.axes[: frame.size]\n"
+    )
+    assert budget.branches_on_space(path) == 3
+
+
 def test_that_more_than_the_budget_is_named_and_so_is_a_folder_without_one(budget):
     most = {"code lines": {"model": 10, "view": 5}}
     lines, above = budget.compared({"code lines": {"model": 11, "view": 5, "new": 1}}, most)

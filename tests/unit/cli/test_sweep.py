@@ -9,7 +9,8 @@ import pytest
 import xarray
 
 import kincompile as kc
-from kincompile.files.sweep_table import SweepTable, read_sweep_table
+from kincompile.files.sweep_table import read_sweep_table
+from kincompile.model.tasks import Sweep
 from kincompile.sweeps.samples import values_of
 from tests.unit.sweep.models import TIMES, crank, folding
 
@@ -141,7 +142,7 @@ def test_the_table_may_be_json(tmp_path):
     file = tmp_path / "crank.json"
     data = json.loads(crank().to_json()) | {"sweep": {"parameters": {"a": [1, "4/2"]}}}
     file.write_text(json.dumps(data), encoding="utf-8")
-    assert read_sweep_table(file) == SweepTable({"a": (1.0, 2.0)})
+    assert read_sweep_table(file) == Sweep({"a": (1.0, 2.0)})
     assert kc.read(file).name == "crank"
 
 

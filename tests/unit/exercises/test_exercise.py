@@ -134,6 +134,30 @@ def test_that_an_overconstrained_model_is_refused_by_name(monkeypatch: Any) -> N
         kc.exercise(read("space/bennett.toml"))
 
 
+def test_that_a_variant_keeps_masses_forces_points_and_outputs() -> None:
+    """The frame of a body is a matter of convention: turned by half a turn, it changes no force."""
+    m = kc.Mechanism("swing", end=1)
+    a = m.parameter("a", 2.0)
+    crank = m.body("crank", (1, 0, 0.4), mass=3, inertia=a, centre=(a / 20, 0))
+    rod = m.body("rod", (3, 1, 0), mass=a, inertia=1, centre=(0.2, 0.1))
+    m.gravity = (0, -9.81)
+    foot = m.point("foot", rod, (a / 4, 0.3))
+    m.output("height", foot.y + a)
+    m.add(kc.Revolute("O", crank, (-1, 0), m.ground, (0, 0)))
+    m.add(kc.Revolute("A", crank, (1, 0), rod, (-a, 0)))
+    m.add(kc.AbsoluteY("guide", rod, (a, 0), 0))
+    m.add(kc.AbsoluteAngle("motor", crank, 0.4 + kc.t))
+    m.add(kc.Spring("spring", foot, m.ground, (1, 3), stiffness=7 * a, free_length=1))
+    values = (("a", 2.0),)
+    change = drawing.Change(values, (("ground", 1.0), ("crank", 1.0), ("rod", 1.0)), ("rod",))
+    made = drawing.VariantBuilder(m, change).mechanism()
+    assert not made.parameters
+    assert made.bodies[1].centre == (-0.2, -0.1)
+    wanted, found = (kc.forces(kc.solve(kc.compile(x), np.linspace(0, 1, 5))) for x in (m, made))
+    for name in ("motor.drive", "x_foot", "height"):
+        np.testing.assert_allclose(found.motion[name], wanted.motion[name], rtol=1e-9, err_msg=name)
+
+
 def test_that_a_model_without_parameters_varies_in_its_lengths() -> None:
     made = kc.exercise(read("slider_crank.toml"), 3, 1).variants
     assert len({str(item.constraints[1].point_i) for item in made}) > 1

@@ -354,7 +354,7 @@ def test_that_alpha_stands_in_profiles_alone():
 TASKS = """
 [tolerance]
 of = ["tip.x"]
-parameters = { a = { low = "-a/3", high = 1e-4, distribution = "uniform" } }
+parameters = { a = { low = "-1/3", high = 1e-4, distribution = "uniform" } }
 clearances = { "no name" = 2e-5 }
 
 [fit]
