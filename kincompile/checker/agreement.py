@@ -26,6 +26,8 @@ OF_ROW = 1e-12
 ABSOLUTE = 1e-13
 ON_MANIFOLD = 1e-8
 """Relative; the states on the manifold are themselves accurate to 1e-12 only."""
+CLOSE = 1e-8
+"""Relative; wider than for equality, so that the fault named is not missed by rounding."""
 ROUNDING = 1e-14
 """What rounding may take from a sum, of the size of its terms."""
 MOST_OF_TERMS = 1e-6
@@ -169,6 +171,12 @@ def is_alike(one: Array, other: Array, sizes: Array | float = 0.0) -> Array:
     with np.errstate(invalid="ignore"):
         off = np.abs(one - other)
         return np.asarray(off <= OF_TERMS * size + OF_ROW * largest + ABSOLUTE)
+
+
+def is_close(one: Array, other: Array, lost: Array | float = 0.0) -> bool:
+    """Return whether the numbers of an entry, (N,), are those of a fault."""
+    size = np.maximum(np.max(np.abs(one)), np.max(np.abs(other)))
+    return bool(np.all(np.abs(one - other) <= CLOSE * size + ABSOLUTE + lost))
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,17 +28,17 @@ from kincompile.checker.conventions import OPPOSITE, conventions_found
 from kincompile.checker.dependence import Dependence
 from kincompile.checker.diagnosis import Diagnostician, undecided_diagnosis
 from kincompile.checker.fault import Kind
-from kincompile.checker.forms import OTHER, is_same_space
-from kincompile.checker.matching import Matcher, Matching
+from kincompile.checker.forms import OTHER, is_same_space, known_forms
+from kincompile.checker.matching import Matcher, Matching, Units
 from kincompile.checker.report import Report
 from kincompile.model.expressions import symbol_names
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from kincompile.checker.diagnosis import Shown
     from kincompile.checker.joint_faults import Index
     from kincompile.checker.reference import ConstraintBlock, Subject
+    from kincompile.checker.slips import Shown
     from kincompile.checker.states import Array, States
     from kincompile.checker.written import Written
 
@@ -73,6 +73,7 @@ class Comparer:
         self._adopt(self._matcher.match())
         for block in subject.blocks:
             self._prefer_one_fault(block)
+            self._prefer_known_form(block)
         self._find_equal_on_manifold()
 
     @property
@@ -173,6 +174,19 @@ class Comparer:
                 if self._is_one_fault(block):
                     return
                 self._adopt(before)
+
+    def _prefer_known_form(self, block: ConstraintBlock) -> None:
+        """Take a known form in which a constraint has fewer slips, if it has not one as it is."""
+        before, fewest = self._matching, len(self._wrong(block))
+        is_plain = before.form(block.rows[0]) is None and before.units == Units()
+        if not fewest or not is_plain or self._is_one_fault(block):
+            return
+        best = before
+        for form in known_forms(block, self._subject):
+            self._adopt(self._matcher.with_form(before, form))
+            if (count := len(self._wrong(block))) < fewest:
+                best, fewest = self._matching, count
+        self._adopt(best)
 
     def _is_one_fault(self, block: ConstraintBlock) -> bool:
         spots = [spot for spot in self._wrong(block) if spot[0] == "Phi_q"]

@@ -8,18 +8,19 @@ Explanations that give the same numbers are equivalent, and are all named.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.checker.agreement import ABSOLUTE, ROUNDING, Given, finite
+from kincompile.checker.agreement import ABSOLUTE, ROUNDING, Given, finite, is_close
 from kincompile.checker.comparison import Diagnosis
-from kincompile.checker.entry_faults import entry_faults
+from kincompile.checker.entry_faults import TypedEntry
 from kincompile.checker.fault import OMISSIONS, TERM_SIGN, Fault, Kind
 from kincompile.checker.forms import known_forms
 from kincompile.checker.joint_faults import PARTS_OF_GAMMA, Index, JointFaults, NumericFault
+from kincompile.checker.misread import Misread
 from kincompile.checker.reference import Subject
-from kincompile.checker.states import Array
 from kincompile.derive.equations import derive_equation
 from kincompile.model.resolve import FreeEquation, Joint
 
@@ -28,13 +29,15 @@ if TYPE_CHECKING:
 
     from kincompile.checker.forms import Form
     from kincompile.checker.reference import ConstraintBlock, Reference
-    from kincompile.checker.states import States
+    from kincompile.checker.slips import Shown
+    from kincompile.checker.states import Array, States
 
-CLOSE = 1e-8
-"""Relative; wider than for equality, so that the fault named is not missed by rounding."""
 ROUNDED = 3e-3
 """Relative difference up to which a constant was perhaps rounded to three digits."""
 MOST_NAMED = 6
+
+_Key = tuple[tuple[int, ...], str, "Form | None"]
+"""The rows of a constraint, a quantity and the form it is in."""
 
 ROUNDED_NUMBER = "rounded number"
 NOT_DEFINED = "not defined"
@@ -44,10 +47,6 @@ _NOT_DEFINED = Diagnosis(
     "it has no finite value at some states where the right one has: it divides by zero, or "
     "takes a root or logarithm of a negative number",
 )
-
-
-Shown = tuple[Array, Array]
-"""Values of an entry and what rounding may have taken from them, (N,) each."""
 
 
 def undecided_diagnosis(given: Given) -> Diagnosis:
@@ -71,9 +70,9 @@ class Diagnostician:
     def __init__(self, reference: Reference, states: States) -> None:
         self._reference = reference
         self._states = states
-        self._catalogues: dict[tuple[tuple[int, ...], str, Form | None], list[NumericFault]] = {}
-        self._entries: dict[tuple[str, Index, Form | None], list[NumericFault]] = {}
-        self._generated = reference.values(states)
+        self._catalogues: dict[_Key, list[NumericFault]] = {}
+        self._misread: dict[_Key, tuple[Misread, list[NumericFault]]] = {}
+        self._entries: dict[tuple[str, Index, Form | None], TypedEntry] = {}
 
     def explain(
         self,
@@ -96,14 +95,35 @@ class Diagnostician:
         found: dict[Index, tuple[Diagnosis, ...]] = {}
         found |= dict.fromkeys(written.keys() - left.keys(), (_NOT_DEFINED,))
         catalogue = self._catalogue(block, quantity, form)
-        found |= _explained(left, [fault for fault in catalogue if len(fault.result) > 1])
+        several = [*self._of_several(block, quantity, form, left)]
+        for faults in (catalogue, several):
+            found |= _explained(left, [fault for fault in faults if len(fault.result) > 1])
         # One entry alone is looked at as it is typed first, in sines and cosines.
-        typed = [fault for place in left for fault in self._typed(quantity, place, form)]
+        typed: list[NumericFault] = [
+            Fault(fault.kind, fault.text, {place: fault.result}, fault.detail)
+            for place in left
+            for fault in self._typed(quantity, place, form).faults
+        ]
         catalogue = [*typed, *catalogue]
         found |= _explained(left, catalogue)
         for place, given in left.items():
             right = self._right(quantity, form)[:, place[0], place[1]]
-            found[place] = _one_entry(place, given, right, catalogue)
+            found[place] = (
+                _one_entry(place, given, right, catalogue)
+                or _named(self._typed(quantity, place, form).slips.one(given))
+                or _named(_at(place, given, several))
+            )
+        # What is left is no slip of one entry: another vector, or two slips at once.
+        joint = block.constraint if form is None else form.joint
+        if isinstance(joint, Joint) and not all(found.values()):
+            vectors = [*self._faults_of(joint, block, quantity, left)]
+            found |= {
+                place: found[place] or _named(fault for fault in vectors if place in fault.result)
+                for place in left
+            }
+        for place, given in left.items():
+            slips = self._typed(quantity, place, form).slips
+            found[place] = found[place] or _named(slips.two(given))
         return found
 
     def is_one_fault(
@@ -136,14 +156,31 @@ class Diagnostician:
         return self._catalogues[key]
 
     def _faults_of(
-        self, joint: Joint, block: ConstraintBlock, quantity: str
+        self,
+        joint: Joint,
+        block: ConstraintBlock,
+        quantity: str,
+        given: Mapping[Index, Shown] | None = None,
     ) -> Iterator[NumericFault]:
+        """Yield the faults of a joint's vectors, or the vectors that fit the entries given."""
         columns = [self._reference.columns.get(name or "") for name in joint.columns]
-        for fault in JointFaults(joint, quantity, self._reference, self._states).faults():
+        columns = columns if quantity == "Phi_q" else [0]
+        # The columns of the ground have no place in the system.
+        system = {
+            (row, column): (block.rows[row], target)
+            for row in range(len(block.rows))
+            for column, target in enumerate(columns)
+            if target is not None
+        }
+        own = JointFaults(joint, quantity, self._reference, self._states)
+        faults = own.faults()
+        if given is not None:
+            faults = own.other_vectors(
+                {place: given[item][0] for place, item in system.items() if item in given}
+            )
+        for fault in faults:
             result = {
-                (block.rows[row], target): values
-                for (row, column), values in fault.result.items()
-                if (target := columns[column] if quantity == "Phi_q" else 0) is not None
+                system[place]: values for place, values in fault.result.items() if place in system
             }
             if result:  # a fault in the columns of the ground alone does not show
                 yield replace(fault, result=result)
@@ -178,31 +215,55 @@ class Diagnostician:
                 (row, column): values[:, k, column]
                 for k, row in enumerate(rows)
                 for column in range(values.shape[-1])
-                if not _close(values[:, k, column], right[:, row, column])
+                if not is_close(values[:, k, column], right[:, row, column])
             }
             if result and quantity != "Phi":
                 yield Fault(Kind.OTHER_FORM, f"it belongs to {text}, and not to your Phi", result)
 
-    def _right(self, quantity: str, form: Form | None) -> Array:
-        right = self._generated.of(quantity)
+    def _right(self, quantity: str, form: Form | None, states: States | None = None) -> Array:
+        """Return the right formulas; at other states than those of the comparison if given."""
+        states = self._states if states is None else states
+        right = self._reference.values(states).of(quantity)
         if form is not None:
             right = right.copy()
-            right[:, list(form.rows)] = form.evaluate(self._states)[quantity]
+            right[:, list(form.rows)] = form.evaluate(states)[quantity]
         return right
 
-    def _typed(self, quantity: str, place: Index, form: Form | None) -> list[NumericFault]:
+    def _typed(self, quantity: str, place: Index, form: Form | None) -> TypedEntry:
         key = (quantity, place, form)
         if key not in self._entries:
             reference, row = self._reference, place[0]
             if form is not None and form.formulas is not None:
                 reference, row = form.formulas, form.rows.index(place[0])
-            faults = entry_faults(reference, quantity, row, place[1], self._states)
-            self._entries[key] = [
-                replace(fault, result={place: values})
-                for fault in faults
-                for values in fault.result.values()
-            ]
+            self._entries[key] = TypedEntry(reference, quantity, row, place[1], self._states)
         return self._entries[key]
+
+    def _of_several(
+        self,
+        block: ConstraintBlock,
+        quantity: str,
+        form: Form | None,
+        left: Mapping[Index, Shown],
+    ) -> Iterator[NumericFault]:
+        """Yield faults that show in several entries, of any formulas: joints or free equations."""
+        if not left:
+            return
+        key = (block.rows, quantity, form)
+        right_at = partial(self._right, quantity, form)
+        if key not in self._misread:
+            own = Misread(self._reference, block, quantity, self._states, right_at)
+            self._misread[key] = own, [*own.faults()]
+        own, faults = self._misread[key]
+        columns = {column for _, column in left} if quantity == "Phi_q" else ()
+        yield from own.exchanged_columns(columns)
+        yield from faults
+
+
+def _at(place: Index, given: Shown, catalogue: Iterable[NumericFault]) -> Iterator[Fault[Array]]:
+    """Yield the faults that show in one entry alone, and explain it."""
+    for fault in catalogue:
+        if fault.result.keys() == {place} and is_close(fault.result[place], *given):
+            yield Fault(fault.kind, fault.text, fault.result[place], fault.detail)
 
 
 def _one_entry(
@@ -212,7 +273,7 @@ def _one_entry(
     partly = _named(
         fault
         for fault in catalogue
-        if place in fault.result and _close(fault.result[place], *given)
+        if place in fault.result and is_close(fault.result[place], *given)
     )
     if partly:
         return tuple(replace(item, text=f"{item.text} (in this entry alone)") for item in partly)
@@ -243,24 +304,20 @@ def _explained(
 def _fits(fault: NumericFault, left: Mapping[Index, Shown]) -> bool:
     """Return whether a fault shows in entries that differ only, with the author's numbers."""
     return all(
-        place in left and _close(values, *left[place]) for place, values in fault.result.items()
+        place in left and is_close(values, *left[place]) for place, values in fault.result.items()
     )
 
 
-def _close(one: Array, other: Array, lost: Array | float = 0.0) -> bool:
-    size = np.maximum(np.max(np.abs(one)), np.max(np.abs(other)))
-    return bool(np.all(np.abs(one - other) <= CLOSE * size + ABSOLUTE + lost))
-
-
-def _named(faults: Iterable[NumericFault]) -> tuple[Diagnosis, ...]:
+def _named(faults: Iterable[Fault[Any]]) -> tuple[Diagnosis, ...]:
     """Return one diagnosis for each kind of fault, the first of its kind."""
     faults = list(faults)
-    by_kind: dict[str, NumericFault] = {}
+    by_kind: dict[str, Fault[Any]] = {}
     for fault in faults:
         by_kind.setdefault(fault.kind, fault)
-    if Kind.LEFT_ZERO in by_kind and not any(map(np.any, by_kind[Kind.LEFT_ZERO].result.values())):
+    zero = by_kind.get(Kind.LEFT_ZERO)
+    if zero is not None and not any(map(np.any, zero.result.values())):
         # Zero was written. That a missing term would also give zero is no further explanation.
-        by_kind = {Kind.LEFT_ZERO: by_kind[Kind.LEFT_ZERO]}
+        by_kind = {Kind.LEFT_ZERO: zero}
     if Kind.MISSING_TERM in by_kind and OMISSIONS.intersection(by_kind):
         # Last: it says less of the same.
         by_kind[Kind.MISSING_TERM] = by_kind.pop(Kind.MISSING_TERM)

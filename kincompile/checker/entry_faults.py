@@ -1,8 +1,13 @@
-"""Faults in an entry written out in sines and cosines, as one types it."""
+"""Faults in an entry written out in sines and cosines, as one types it.
+
+The usual faults are made and evaluated. Any other slip is found the other way round, from the
+number of the author: `slips`.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 from math import prod
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +16,11 @@ import sympy
 
 from kincompile.checker.agreement import is_alike
 from kincompile.checker.fault import A_TERM, Fault, Kind, term_faults, whole_faults
+from kincompile.checker.slips import Slips
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from kincompile.checker.reference import Reference
     from kincompile.checker.states import Array, States
@@ -25,38 +31,65 @@ MOST_EXPANDED = 1000
 """Terms up to which an entry is multiplied out; like ones are among them, and join."""
 
 
-def entry_faults(
-    reference: Reference, quantity: str, row: int, column: int, states: States
-) -> Iterator[Fault[Mapping[tuple[int, int], Array]]]:
-    """Yield the faults of one entry; they show there and nowhere else."""
-    entry = reference.expression(quantity, row, column)
-    if _count(entry) <= MOST_EXPANDED:
-        entry = sympy.expand(entry)
-    printed = reference.printed(entry)
-    angles = [
-        sympy.Symbol(name)
-        for name, is_angle in zip(reference.coordinates, reference.angular, strict=True)
-        if is_angle
-    ]
-    faults = [*whole_faults(quantity, "the entry", lambda factor: factor * entry, printed)]
-    text = "sine and cosine are swapped throughout"
-    faults.append(Fault(Kind.SINE_COSINE, text, _sine_cosine(entry), printed))
-    terms = sympy.Add.make_args(entry)
-    parts = [entry, *terms] if len(terms) <= MOST_TERMS else [entry]
-    replaced = [0] * len(faults)  # number of the part in whose place the result stands
-    for k, term in enumerate(parts[1:], 1):
-        found = list(_faults_of_term(term, angles))
-        faults += found
-        replaced += [k] * len(found)
-    # Sums are taken of numbers: SymPy would sort the terms of each.
-    results = [fault.result for fault in faults]
-    values, sizes = (item[..., None] for item in reference.evaluate([*parts, *results], states))
-    right, wrong = values[:, :1], values[:, :1] - values[:, replaced] + values[:, len(parts) :]
-    sizes = sizes[:, :1] + np.abs(values[:, replaced]) + sizes[:, len(parts) :]
-    equal = np.all(is_alike(wrong, right, sizes), axis=(0, 2))
-    for k, fault in enumerate(faults):
-        if not equal[k]:
-            yield replace(fault, result={(row, column): wrong[:, k, 0]})
+class TypedEntry:
+    """One entry with its faults, which show there and nowhere else."""
+
+    def __init__(
+        self, reference: Reference, quantity: str, row: int, column: int, states: States
+    ) -> None:
+        self._reference, self._quantity, self._states = reference, quantity, states
+        self._derived = self._entry = reference.expression(quantity, row, column)
+        if _count(self._derived) <= MOST_EXPANDED:
+            self._entry = _multiplied_out(self._derived)
+
+    @cached_property
+    def slips(self) -> Slips:
+        """What may stand in the place of its products, besides the usual faults."""
+        is_short = len(sympy.Add.make_args(self._entry)) <= MOST_TERMS
+        forms = dict.fromkeys((self._derived, self._entry) if is_short else (self._derived,))
+        return Slips(self._reference, list(forms), self._quantity, self._states)
+
+    @cached_property
+    def faults(self) -> list[Fault[Array]]:
+        """The usual faults, with the entry's values."""
+        reference, entry = self._reference, self._entry
+        printed = reference.printed(entry)
+        angles = [
+            sympy.Symbol(name)
+            for name, is_angle in zip(reference.coordinates, reference.angular, strict=True)
+            if is_angle
+        ]
+        faults = [*whole_faults(self._quantity, "the entry", lambda x: x * entry, printed)]
+        text = "sine and cosine are swapped throughout"
+        faults.append(Fault(Kind.SINE_COSINE, text, _sine_cosine(entry), printed))
+        terms = sympy.Add.make_args(entry)
+        parts = [entry, *terms] if len(terms) <= MOST_TERMS else [entry]
+        replaced = [0] * len(faults)  # number of the part in whose place the result stands
+        for k, term in enumerate(parts[1:], 1):
+            found = list(_faults_of_term(term, angles))
+            faults += found
+            replaced += [k] * len(found)
+        # Sums are taken of numbers: SymPy would sort the terms of each.
+        evaluated = reference.evaluate([*parts, *(fault.result for fault in faults)], self._states)
+        values, sizes = (item[..., None] for item in evaluated)
+        right, wrong = values[:, :1], values[:, :1] - values[:, replaced] + values[:, len(parts) :]
+        sizes = sizes[:, :1] + np.abs(values[:, replaced]) + sizes[:, len(parts) :]
+        equal = np.all(is_alike(wrong, right, sizes), axis=(0, 2))
+        return [
+            replace(fault, result=wrong[:, k, 0]) for k, fault in enumerate(faults) if not equal[k]
+        ]
+
+
+def _multiplied_out(expression: sympy.Expr) -> sympy.Expr:
+    """Return a sum of products; roots and quotients of sums stay as they are."""
+    kept = {
+        item: sympy.Dummy()
+        for item in expression.atoms(sympy.Pow)
+        if item.base.is_Add and not (item.exp.is_Integer and item.exp > 0)
+    }
+    back = {symbol: item for item, symbol in kept.items()}
+    expanded: sympy.Expr = sympy.expand(expression.xreplace(kept)).xreplace(back)
+    return expanded
 
 
 def _count(expression: Any) -> int:

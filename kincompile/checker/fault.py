@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from math import pi
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 if TYPE_CHECKING:
@@ -50,6 +51,14 @@ class Kind:
     WITHOUT = "counted as zero"
     COUPLING = "coupling 2 w (r_j_dot - r_i_dot) missing"
     SQUARES = "w_j^2 - w_i^2 for (w_j - w_i)^2"
+    MULTIPLE = "constant factor"
+    DEGREES = "degrees for radians"
+    OTHER_VARIABLE = "another variable in a factor"
+    EXTRA_FACTOR = "factor too much"
+    COLUMNS = "columns exchanged"
+    ARM = "moment arm from another point"
+    OTHER_VECTOR = "another vector in the body"
+    TWO_SLIPS = "two slips"
 
 
 A_TERM = "a term"
@@ -61,6 +70,9 @@ OMISSIONS = frozenset({
     Kind.DRIVER_RATE,
 })  # fmt: skip
 """What a missing term may be called by its place in the derivation."""
+
+NEAR = 1e-6
+"""Between a factor found from numbers and the one that is meant."""
 
 Result = TypeVar("Result")
 
@@ -94,3 +106,16 @@ def term_faults(
     yield Fault(Kind.SIGN, f"{name} has the wrong sign", multiple(Fraction(-1)), detail)
     for word, factor in (("twice", Fraction(2)), ("half", Fraction(1, 2))):
         yield Fault(Kind.FACTOR, f"{name} is counted {word}", multiple(factor), detail)
+
+
+def multiple_fault(name: str, factor: float) -> tuple[str, str]:
+    """Return kind and text of a formula or term, by its name, that is a multiple of the right."""
+    for fault in term_faults(name, float):
+        if abs(factor - fault.result) <= NEAR:
+            return fault.kind, fault.text
+    for text, degrees in (("too much in", pi / 180), ("missing in", 180 / pi)):
+        if abs(abs(factor) / degrees - 1) <= NEAR:
+            return Kind.DEGREES, f"a factor pi/180 is {text} {name}: degrees stand for radians"
+    exact = Fraction(factor).limit_denominator(1000)
+    shown = str(exact) if abs(factor - exact) <= NEAR else f"{factor:.6g}"
+    return Kind.MULTIPLE, f"{name} is {shown} times what it should be"

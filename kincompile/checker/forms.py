@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy
 
+from kincompile.calculus.expand import Expansion
 from kincompile.calculus.expressions import Expression, Rotated, dot
 from kincompile.calculus.space import EulerRotation
 from kincompile.checker.agreement import ON_MANIFOLD
@@ -27,6 +28,7 @@ from kincompile.errors import KincompileError
 from kincompile.model.absolute import AbsoluteDistance
 from kincompile.model.relative import Distance
 from kincompile.model.resolve import Joint
+from kincompile.model.symbolic import SymbolicEnvironment
 from kincompile.model.system import ConstraintSystem
 
 if TYPE_CHECKING:
@@ -65,11 +67,16 @@ class Form:
     rows: tuple[int, ...]  # the rows of the system, in the order of the form's own
     evaluate: Evaluate  # gives its quantities at states
     joint: Joint | None = None
-    formulas: Reference | None = None
+    write: Callable[[], Reference | None] | None = None  # gives its formulas, where they are known
     sizes: Evaluate | None = None  # gives the sizes of the terms of its quantities at states
     accuracy: float = 0.0  # relative accuracy of its values; 0 where they are exact
     # Whether it is the author's own, from which the author's other formulas have to follow.
     defines: bool = False
+
+    @cached_property
+    def formulas(self) -> Reference | None:
+        """Its formulas, written out when they are asked for; None where they are not known."""
+        return None if self.write is None else self.write()
 
 
 def exchanged(block: ConstraintBlock, subject: Subject) -> Form | None:
@@ -129,10 +136,26 @@ def own_form(
 
 def _derived(reference: Reference, rows: Sequence[int], Phi: Sequence[sympy.Expr]) -> Form | None:
     """Return the form of other equations, differentiated by the compiler; None if it cannot."""
+    formulas = _formulas(reference, Phi)
+    if formulas is None:
+        return None
+
+    def evaluate(states: States) -> Mapping[str, Array]:
+        values = formulas.values(states)
+        return {name: values.of(name) for name in QUANTITIES}
+
+    def sizes(states: States) -> Mapping[str, Array]:
+        return {name: formulas.term_sizes(name, states) for name in QUANTITIES}
+
+    return Form(EQUIVALENT, OTHER, tuple(rows), evaluate, write=lambda: formulas, sizes=sizes)
+
+
+def _formulas(reference: Reference, Phi: Sequence[sympy.Expr]) -> Reference | None:
+    """Return the formulas of other equations of the coordinates; None if they cannot be derived."""
     system = reference.system
     free = system.coordinates[sum(map(len, system.body_columns)) :]
     try:
-        formulas = reference.another(
+        return reference.another(
             ConstraintSystem(
                 system.name,
                 [item.name for item in free],
@@ -146,15 +169,6 @@ def _derived(reference: Reference, rows: Sequence[int], Phi: Sequence[sympy.Expr
         )
     except KincompileError:
         return None
-
-    def evaluate(states: States) -> Mapping[str, Array]:
-        values = formulas.values(states)
-        return {name: values.of(name) for name in QUANTITIES}
-
-    def sizes(states: States) -> Mapping[str, Array]:
-        return {name: formulas.term_sizes(name, states) for name in QUANTITIES}
-
-    return Form(EQUIVALENT, OTHER, tuple(rows), evaluate, formulas=formulas, sizes=sizes)
 
 
 def _differenced(reference: Reference, rows: Sequence[int], Phi: Function) -> Form:
@@ -263,7 +277,16 @@ def _other_extensions(block: ConstraintBlock, subject: Subject) -> Iterator[Form
         Phi = tuple(everywhere(item, change) for item in joint.template.Phi)
         other = replace(joint, template=replace(joint.template, Phi=Phi))
         if Phi != joint.template.Phi:
-            yield _of_joint(EXTENSION, text, other, block, subject.reference)
+            # Its faults are those of its entries: derivatives of (1 - p^T p) v have no name.
+            form = _of_joint(EXTENSION, text, other, block, subject.reference)
+            yield replace(form, joint=None, write=partial(_written, other, subject.reference))
+
+
+def _written(joint: Joint, reference: Reference) -> Reference | None:
+    """Return the formulas of a joint by itself."""
+    expansion = Expansion(SymbolicEnvironment(joint), joint.template.dimension)
+    Phi = [item for Phi in joint.template.Phi for item in expansion.components(Phi)]
+    return _formulas(reference, Phi)
 
 
 def _with_norm(node: Expression) -> Expression | None:
@@ -271,6 +294,14 @@ def _with_norm(node: Expression) -> Expression | None:
     match node:
         case Rotated(EulerRotation(p), vector, ()):
             return node + (dot(p, p) - 1) * vector
+    return None
+
+
+def _without_norm(node: Expression) -> Expression | None:
+    """Return A v + (1 - p^T p) v for A v."""
+    match node:
+        case Rotated(EulerRotation(p), vector, ()):
+            return node + (1 - dot(p, p)) * vector
     return None
 
 
@@ -284,6 +315,7 @@ def _normalised(node: Expression) -> Expression | None:
 
 EXTENSIONS: Mapping[str, Callable[[Expression], Expression | None]] = {
     "A = (2 e0^2 - 1) I + 2 (e e^T + e0 e~) instead of E G^T": _with_norm,
+    "A = (1 - 2 e^T e) I + 2 (e e^T + e0 e~) instead of E G^T": _without_norm,
     "A = E G^T/(p^T p) instead of E G^T": _normalised,
 }
 """What is written, and what stands for a turned vector."""

@@ -35,6 +35,7 @@ class Symbols:
 
     angles: frozenset[str]
     vectors: frozenset[str]
+    positions: frozenset[str]  # of the bodies: r_i, r_j
     partners: Mapping[str, str]  # the vector that each vector is easily mistaken for, by name
 
     def other_angle(self, name: str) -> str | None:
@@ -189,6 +190,12 @@ def _wrong_rotations(node: ex.Rotated, symbols: Symbols) -> Iterator[Fault[ex.Ex
     yield Fault(Kind.TRANSPOSED, f"{name} is transposed", transposed)
     if along:
         yield Fault(Kind.TRANSPOSED, f"the angle has the wrong sign in {name}", back)
+    if isinstance(vector, ex.VectorSymbol) and vector.name.startswith("s_"):
+        for text, origin in _other_origins(index, symbols):
+            arm: ex.Vector = ex.VectorSum((*origin, ex.Rotated(node.rotation, vector)))
+            arm = ex.Perpendicular(arm) if along else arm
+            text = f"{text} stands where that from the body's own, A_{index} s_{index}, belongs"
+            yield Fault(Kind.ARM, text, arm)
     complement = ex.Sum(
         (ex.Product((ex.Number(Fraction(1, 2)), ex.Pi())), ex.Product((_MINUS_ONE, angle)))
     )
@@ -200,6 +207,17 @@ def _wrong_rotations(node: ex.Rotated, symbols: Symbols) -> Iterator[Fault[ex.Ex
         yield Fault(
             Kind.MIXED_ANGLES, text, ex.Rotated(PlaneRotation(ex.Symbol(mixed)), vector, along)
         )
+
+
+def _other_origins(index: str, symbols: Symbols) -> Iterator[tuple[str, tuple[ex.Vector, ...]]]:
+    """Yield other points than the body's origin to take an arm from, with the way to that."""
+    own = f"r_{index}"
+    if own in symbols.positions:
+        way = (ex.VectorSymbol(own),)
+        yield f"the arm from the origin of the ground, r_{index} + A_{index} s_{index},", way
+        for other in symbols.positions - {own}:
+            there = ex.Scaled(_MINUS_ONE, ex.VectorSymbol(other))
+            yield f"the arm from the origin of body {other.removeprefix('r_')}", (*way, there)
 
 
 def _wrong_slopes(node: ex.Rotated | ex.RotationSlope) -> Iterator[Fault[ex.Expression]]:

@@ -21,7 +21,7 @@ from kincompile.calculus import expressions as ex
 from kincompile.calculus.rotations import PlaneRotation
 from kincompile.calculus.space import EulerRotation, TurnedFrame
 from kincompile.calculus.symbols import PlaneFrame
-from kincompile.checker.agreement import is_alike
+from kincompile.checker.agreement import ABSOLUTE, CLOSE, is_alike
 from kincompile.checker.collected import (
     CollectedTerm,
     collected,
@@ -38,7 +38,12 @@ from kincompile.checker.formula_faults import (
     times,
 )
 from kincompile.checker.plain_text import described
-from kincompile.checker.vectors import NumericExpansion, column_values, component_values
+from kincompile.checker.vectors import (
+    NumericExpansion,
+    Shifted,
+    column_values,
+    component_values,
+)
 from kincompile.derive.collected import is_rate
 from kincompile.derive.derivation import derive
 from kincompile.derive.partials import partials
@@ -98,7 +103,12 @@ class JointFaults:
             frame.phi.name for frame in joint.template.frames if isinstance(frame, PlaneFrame)
         )
         partners = joint.written.partners()
-        self._symbols = Symbols(angles, frozenset(joint.points), partners)
+        places = frozenset(
+            item.name
+            for item in joint.template.coordinates
+            if isinstance(item, ex.VectorSymbol) and item.name.startswith("r_")
+        )
+        self._symbols = Symbols(angles, frozenset(joint.points), places, partners)
         self._parts = self._right_formulas()
         self._right = {place: self._values(place, item) for place, item in self._parts.items()}
 
@@ -113,6 +123,55 @@ class JointFaults:
             yield from self._opposite_rows()
         else:
             yield from self._exchanged_rows()
+
+    def other_vectors(self, given: Mapping[Index, Array]) -> Iterator[NumericFault]:
+        """Yield body-fixed vectors that are no attributes, fitted to entries by hand, (N,) each.
+
+        A formula is linear in each vector in its place. The vector is another one in each set of
+        parameters, and all entries of its place are fitted together.
+        """
+        for place, expression in self._parts.items():
+            row, column = self._corner(place)
+            right = self._right[place]
+            places = np.ndindex(*right.shape[1:])
+            own = [(a, b) for a, b in places if (row + a, column + b) in given]
+            if not own:
+                continue
+            wrong = right.copy()
+            for a, b in own:
+                wrong[:, a, b] = given[row + a, column + b]
+            for name in sorted(self._symbols.vectors):
+                if (off := self._offsets(place, expression, name, wrong - right)) is not None:
+                    text = f"another vector stands where {name} belongs"
+                    if np.allclose(off, off[0]):
+                        text += f"; it is off by ({', '.join(f'{x:.4g}' for x in off[0])})"
+                    result = {(row + a, column + b): wrong[:, a, b] for a, b in own}
+                    yield Fault(Kind.OTHER_VECTOR, text, result)
+
+    def _offsets(
+        self, place: Index, expression: ex.Expression, name: str, off: Array
+    ) -> Array | None:
+        """Return what is added to a vector, by set of parameters; None if nothing explains it."""
+        size = len(self._joint.points[name])
+
+        def moved(offset: Array) -> Array:
+            leaf, new = ex.VectorSymbol(name, size), Shifted(name, size, tuple(offset))
+            changed = everywhere(expression, lambda node: new if node == leaf else None)
+            return self._values(place, changed) - self._right[place]
+
+        slopes = np.stack([moved(unit) for unit in np.eye(size)], axis=-1)
+        twice = moved(np.full(size, 2.0))
+        if not np.any(slopes) or not np.allclose(twice, 2 * slopes.sum(axis=-1), atol=ABSOLUTE):
+            return None
+        groups, found = self._states.group, []
+        for group in np.unique(groups):
+            matrix = slopes[groups == group].reshape(-1, size)
+            numbers = off[groups == group].ravel()
+            found.append(np.linalg.lstsq(matrix, numbers, rcond=None)[0])
+            allowed = CLOSE * np.max(np.abs(off))
+            if not np.allclose(matrix @ found[-1], numbers, rtol=CLOSE, atol=allowed):
+                return None
+        return np.array(found)
 
     def _if_different(
         self, kind: str, text: str, values: Mapping[Index, Array]

@@ -242,7 +242,7 @@ class Matcher:
             if all(right[own]):
                 continue
             for form in self._forms(block, own, matching):
-                trial = self._with_form(matching, form, own, written)
+                trial = self.with_form(matching, form)
                 if form.defines or all(self._right_rows(trial, shown)[own]):
                     matching = trial
                     break
@@ -267,13 +267,10 @@ class Matcher:
             if form := jacobian_form(subject, rows, Phi_q):
                 yield form
 
-    def _with_form(
-        self,
-        matching: Matching,
-        form: Form,
-        own: list[int],
-        written: Mapping[str, Given],
-    ) -> Matching:
+    def with_form(self, matching: Matching, form: Form) -> Matching:
+        """Return a matching with a constraint in another form."""
+        written = self.written(matching, self._subject.states)
+        own = [k for k, row in enumerate(matching.rows) if row in form.rows]
         factors = matching.factors.copy()
         factors[own] = 1.0
         trial = replace(matching, forms=(*matching.forms, form), factors=factors)

@@ -53,6 +53,13 @@ class Exchanged(ex.VectorSymbol):
 
 
 @dataclass(frozen=True, slots=True)
+class Shifted(ex.VectorSymbol):
+    """A body-fixed vector with something added to it: to find which vector stands for it."""
+
+    offset: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class WrongTilde(EulerRotation):
     """Euler parameters whose B(p, s) has the wrong sign of s~: a fault.
 
@@ -104,6 +111,8 @@ class NumericEnvironment:
         """Return a position, a velocity or a body-fixed vector; its components may be exchanged."""
         plain = ex.VectorSymbol(symbol.name, symbol.size)
         components = tuple(self._number(item) for item in self._symbolic.vector(plain))
+        if isinstance(symbol, Shifted):
+            return tuple(a + b for a, b in zip(components, symbol.offset, strict=True))
         return components[::-1] if isinstance(symbol, Exchanged) else components
 
     def time_function(self, function: ex.TimeFunction) -> ex.Value:

@@ -109,6 +109,7 @@ def extended(change: Any) -> Any:
     ("text", "change"),
     [
         ("A = (2 e0^2 - 1) I", lambda usual, n: usual + (n - 1) * sympy.eye(3)),
+        ("A = (1 - 2 e^T e) I", lambda usual, n: usual + (1 - n) * sympy.eye(3)),
         ("A = E G^T/(p^T p)", lambda usual, n: usual / n),
     ],
 )
