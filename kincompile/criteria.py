@@ -193,6 +193,13 @@ grow there as one over the root of the time that is left, so that this is q_dot 
 most `LEFT` smallest steps. They have grown `GROWN` times since the time before, and the time to be
 reached lies beyond the lock-up by more than the part `BEFORE_LOCK_UP` of the way to it."""
 
+GROWTH = 1.5
+"""By what a step is longer than the one before it, that was good."""
+
+BEFORE, SHORTER = 0.75, 8.0
+"""Part of the way to where velocities end, as they grow, that a step goes there, and by what a step
+is shorter at most than the one before it."""
+
 MAX_SUBSTEPS = 10_000
 """Sub-steps between two times after which the march is given up, about a second."""
 

@@ -2220,6 +2220,9 @@ static const int IS_REDUNDANT[] = {
 // At a lock-up velocities grow as one over the root of the time that is left: it is at most LEFT
 // smallest steps, they have GROWN by so much, and it is so far before the time to be reached.
 static const double LEFT = 64.0, GROWN = 8.0, BEFORE_LOCK_UP = 0.0001;
+// By what a step is longer than one that was good, the part that it goes of the way to where
+// velocities end, and by what it is shorter at most.
+static const double GROWTH = 1.5, BEFORE = 0.75, SHORTER = 8.0;
 // Newton iterations of a predicted point, sub-steps between two times.
 enum { MAX_CORRECTIONS = 6, MAX_SUBSTEPS = 10000 };
 
@@ -2490,11 +2493,9 @@ static double speed_of(strip *b, const scales *s)
     return most;
 }
 
-// Say whether a point that cannot be left by the smallest step is at a lock-up before a time.
-// There the equations must have values. Its speed was that before.
-static int locks_up(strip *b, const scales *s, double t, double smallest, double before)
+// Return the time left at the growth of the largest velocity, where it grows forward.
+static double until_lock_up(strip *b, const scales *s, double forward)
 {
-    const double forward = t - b->t[0];
     const double speed = speed_of(b, s);
     double growth = 0.0;
     for (int i = 0; i < N; i++)
@@ -2502,8 +2503,16 @@ static int locks_up(strip *b, const scales *s, double t, double smallest, double
             const double sign = b->q_dot[i][0] > 0.0 ? 1.0 : -1.0;
             growth = b->q_ddot[i][0] * s->inverse[i][0] * sign;
         }
-    const double left = forward * growth > 0.0 ? speed / (2.0 * fabs(growth)) : INFINITY;
-    if (!(left <= LEFT * smallest && speed >= GROWN * before))
+    return forward * growth > 0.0 ? speed / (2.0 * fabs(growth)) : INFINITY;
+}
+
+// Say whether a point that cannot be left by the smallest step is at a lock-up before a time.
+// There the equations must have values. Its speed was that before.
+static int locks_up(strip *b, const scales *s, double t, double smallest, double before)
+{
+    const double forward = t - b->t[0];
+    const double left = until_lock_up(b, s, forward);
+    if (!(left <= LEFT * smallest && speed_of(b, s) >= GROWN * before))
         return 0;
     b->t[0] = t;
     position_of_strip(b, 1);
@@ -2529,7 +2538,8 @@ static void scales_of(scales *own, const scales *s, size_t k)
 }
 
 // Take one lane from a good point to a time, in sub-steps. These are halved where they fail and
-// doubled where they do not.
+// longer where they do not, and no longer than a part of the way to where velocities end as they
+// grow.
 static void advance(strip *b, const scales *s, state *at, double t, size_t k, outcome *o)
 {
     strip alone;
@@ -2547,25 +2557,28 @@ static void advance(strip *b, const scales *s, state *at, double t, size_t k, ou
     for (int n = 0; n < MAX_SUBSTEPS; n++) {
         const int is_whole = fabs(h) >= fabs(t - at->t);
         const double following = is_whole ? t : at->t + h;
-        put_at(&alone, at, 0, 1);
         step(&alone, &own, &following, &found, 1);
         const int is_good = found.status[0] == SPATIAL_SLIDER_CRANK_CONVERGED;
         iterations += found.iterations[0];
-        if (is_good)
+        if (is_good) {
             take_up(at, &alone, 0);
+        } else {
+            put_at(&alone, at, 0, 1);
+        }
         is_stuck = !is_good && fabs(h) <= smallest;
         if (is_stuck || (is_good && is_whole))
             break;
-        h *= is_good ? 2.0 : 0.5;
+        double size = fabs(h);
+        const double least = fmax(size / SHORTER, is_good ? 2.0 * smallest : 0.0);
+        const double ahead = fmax(BEFORE * until_lock_up(&alone, &own, h), least);
+        size = fmin(size * (is_good ? GROWTH : 0.5), ahead);
+        h = h > 0.0 ? size : -size;
     }
     int status = found.status[0];
     if (status == SPATIAL_SLIDER_CRANK_CONVERGED && at->t != t)
         status = SPATIAL_SLIDER_CRANK_NOT_CONVERGED;
-    if (is_stuck) {
-        put_at(&alone, at, 0, 1);
-        if (locks_up(&alone, &own, t, smallest, before))
-            status = SPATIAL_SLIDER_CRANK_LOCK_UP;
-    }
+    if (is_stuck && locks_up(&alone, &own, t, smallest, before))
+        status = SPATIAL_SLIDER_CRANK_LOCK_UP;
     o->residual[k] = found.residual[0];
     o->status[k] = status;
     o->iterations[k] = iterations;

@@ -414,14 +414,17 @@ _PATTERN, _PLACES, _NONZEROS = PATTERN.tolist(), _PHI_Q_NONZEROS.places, len(PAT
 _LANES = 1  # points that are worked on at once
 # by what a march judges, and what became of a point
 _AGREEMENT = 1e-06
+_BEFORE = 0.75
 _BEFORE_LOCK_UP = 0.0001
 _FARTHEST = 281474976.710656
 _GROWN = 8.0
+_GROWTH = 1.5
 _KINK = 8.0
 _LEFT = 64.0
 _NEARLY_SINGULAR = 30.0
 _RESIDUAL_FACTOR = 10.0
 _ROUNDING = 3.552713678800501e-15
+_SHORTER = 8.0
 _SMALL_ERROR = 0.05
 _SMALLEST_PART = 9.5367431640625e-07
 _SMOOTH = 1e-09
@@ -756,20 +759,25 @@ def _speed_of(b, s):
     return most
 
 
-def _locks_up(b, s, t, smallest, before):
-    """Say whether a point that cannot be left by the smallest step is at a lock-up before a time.
-
-    There the equations must have values. Its speed was that before.
-    """
-    forward = t - b.t
+def _until_lock_up(b, s, forward):
+    """Return the time left at the growth of the largest velocity, where it grows forward."""
     speed = _speed_of(b, s)
     growth = 0.0
     for i in range(N_COORDINATES):
         if abs(b.q_dot[i]) * s.inverse[i] == speed:
             sign = 1.0 if b.q_dot[i] > 0.0 else -1.0
             growth = b.q_ddot[i] * s.inverse[i] * sign
-    left = _ratio(speed, 2.0 * abs(growth)) if forward * growth > 0.0 else math.inf
-    if not (left <= _LEFT * smallest and speed >= _GROWN * before):
+    return _ratio(speed, 2.0 * abs(growth)) if forward * growth > 0.0 else math.inf
+
+
+def _locks_up(b, s, t, smallest, before):
+    """Say whether a point that cannot be left by the smallest step is at a lock-up before a time.
+
+    There the equations must have values. Its speed was that before.
+    """
+    forward = t - b.t
+    left = _until_lock_up(b, s, forward)
+    if not (left <= _LEFT * smallest and _speed_of(b, s) >= _GROWN * before):
         return False
     b.t = t
     _position_at(b)
@@ -795,7 +803,8 @@ def _scales_of(own, s, k):
 def _advance(b, s, at, t, k, o):
     """Take one lane from a good point to a time, in sub-steps.
 
-    These are halved where they fail and doubled where they do not.
+    These are halved where they fail and longer where they do not, and no longer than a part of the
+    way to where velocities end as they grow.
     """
     alone = _Point()
     own = _Scales()
@@ -812,23 +821,26 @@ def _advance(b, s, at, t, k, o):
     for n in range(_MAX_SUBSTEPS):
         is_whole = abs(h) >= abs(t - at.t)
         following = t if is_whole else at.t + h
-        _copy(alone, at)
         _step(alone, own, following, found)
         is_good = found.status == _CONVERGED
         iterations += found.iterations
         if is_good:
             _copy(at, alone)
+        else:
+            _copy(alone, at)
         is_stuck = not is_good and abs(h) <= smallest
         if is_stuck or (is_good and is_whole):
             break
-        h *= 2.0 if is_good else 0.5
+        size = abs(h)
+        least = max(size / _SHORTER, 2.0 * smallest if is_good else 0.0)
+        ahead = max(_BEFORE * _until_lock_up(alone, own, h), least)
+        size = min(size * (_GROWTH if is_good else 0.5), ahead)
+        h = size if h > 0.0 else -size
     status = found.status
     if status == _CONVERGED and at.t != t:
         status = _NOT_CONVERGED
-    if is_stuck:
-        _copy(alone, at)
-        if _locks_up(alone, own, t, smallest, before):
-            status = _LOCK_UP
+    if is_stuck and _locks_up(alone, own, t, smallest, before):
+        status = _LOCK_UP
     o.residual = found.residual
     o.status = status
     o.iterations = iterations

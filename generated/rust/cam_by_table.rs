@@ -386,14 +386,17 @@ const COVER: [usize; 7] = [
 
 // By what a march judges, and what became of a point.
 const AGREEMENT: f64 = 1e-06;
+const BEFORE: f64 = 0.75;
 const BEFORE_LOCK_UP: f64 = 0.0001;
 const FARTHEST: f64 = 281474976.710656;
 const GROWN: f64 = 8.0;
+const GROWTH: f64 = 1.5;
 const KINK: f64 = 8.0;
 const LEFT: f64 = 64.0;
 const NEARLY_SINGULAR: f64 = 30.0;
 const RESIDUAL_FACTOR: f64 = 10.0;
 const ROUNDING: f64 = 3.552713678800501e-15;
+const SHORTER: f64 = 8.0;
 const SMALL_ERROR: f64 = 0.05;
 const SMALLEST_PART: f64 = 9.5367431640625e-07;
 const SMOOTH: f64 = 1e-09;
@@ -1586,10 +1589,8 @@ fn speed_of(b: &Point, s: &Scales) -> f64 {
     return most;
 }
 
-/// Say whether a point that cannot be left by the smallest step is at a lock-up before a time.
-/// There the equations must have values. Its speed was that before.
-fn locks_up(b: &mut Point, s: &Scales, t: f64, smallest: f64, before: f64) -> bool {
-    let forward = t - b.t;
+/// Return the time left at the growth of the largest velocity, where it grows forward.
+fn until_lock_up(b: &Point, s: &Scales, forward: f64) -> f64 {
     let speed = speed_of(b, s);
     let mut growth: f64 = 0.0;
     for i in 0..N_COORDINATES {
@@ -1598,8 +1599,15 @@ fn locks_up(b: &mut Point, s: &Scales, t: f64, smallest: f64, before: f64) -> bo
             growth = b.q_ddot[i] * s.inverse[i] * sign;
         }
     }
-    let left = if forward * growth > 0.0 { speed / (2.0 * growth.abs()) } else { INFINITE };
-    if !(left <= LEFT * smallest && speed >= GROWN * before) {
+    return if forward * growth > 0.0 { speed / (2.0 * growth.abs()) } else { INFINITE };
+}
+
+/// Say whether a point that cannot be left by the smallest step is at a lock-up before a time.
+/// There the equations must have values. Its speed was that before.
+fn locks_up(b: &mut Point, s: &Scales, t: f64, smallest: f64, before: f64) -> bool {
+    let forward = t - b.t;
+    let left = until_lock_up(b, s, forward);
+    if !(left <= LEFT * smallest && speed_of(b, s) >= GROWN * before) {
         return false;
     }
     b.t = t;
@@ -1627,7 +1635,8 @@ fn scales_of(own: &mut Scales, s: &Scales, k: usize) {
 }
 
 /// Take one lane from a good point to a time, in sub-steps. These are halved where they fail and
-/// doubled where they do not.
+/// longer where they do not, and no longer than a part of the way to where velocities end as they
+/// grow.
 fn advance(b: &mut Point, s: &Scales, at: &mut State, t: f64, k: usize, o: &mut Outcome) {
     let mut alone = Point::new();
     let mut own = Scales::new();
@@ -1643,28 +1652,30 @@ fn advance(b: &mut Point, s: &Scales, at: &mut State, t: f64, k: usize, o: &mut 
     for n in 0..MAX_SUBSTEPS {
         let is_whole = h.abs() >= (t - at.t).abs();
         let following = if is_whole { t } else { at.t + h };
-        put_at(&mut alone, at);
         step(&mut alone, &own, following, &mut found);
         let is_good = found.status == CONVERGED;
         iterations += found.iterations;
         if is_good {
             take_up(at, &alone);
+        } else {
+            put_at(&mut alone, at);
         }
         is_stuck = !is_good && h.abs() <= smallest;
         if is_stuck || (is_good && is_whole) {
             break;
         }
-        h *= if is_good { 2.0 } else { 0.5 };
+        let mut size = h.abs();
+        let least = (size / SHORTER).max(if is_good { 2.0 * smallest } else { 0.0 });
+        let ahead = (BEFORE * until_lock_up(&alone, &own, h)).max(least);
+        size = (size * (if is_good { GROWTH } else { 0.5 })).min(ahead);
+        h = if h > 0.0 { size } else { -size };
     }
     let mut status = found.status;
     if status == CONVERGED && at.t != t {
         status = NOT_CONVERGED;
     }
-    if is_stuck {
-        put_at(&mut alone, at);
-        if locks_up(&mut alone, &own, t, smallest, before) {
-            status = LOCK_UP;
-        }
+    if is_stuck && locks_up(&mut alone, &own, t, smallest, before) {
+        status = LOCK_UP;
     }
     o.residual = found.residual;
     o.status = status;

@@ -16,7 +16,7 @@ from kincompile.runtime.along import lead, lead_together
 from kincompile.runtime.attempts import other_sides, safeguarded
 from kincompile.runtime.engine.planned import Planned
 from kincompile.runtime.engine.scales import Point
-from kincompile.runtime.follow import follow
+from kincompile.runtime.follow import Motion, follow
 from kincompile.runtime.march import March, all_hold
 from kincompile.runtime.problem import problem
 from kincompile.runtime.start import start, turned_guesses
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Array
-    from kincompile.runtime.follow import Motion
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.problem import Problem
 
@@ -243,13 +242,27 @@ class Sets:
         return found, least < np.inf, is_assembled, ~ends
 
     def _corrected(
-        self, variants: Places, q: Array, most: int, reach: float = np.inf
+        self, variants: Places, begin: Array, most: int, reach: float = np.inf
     ) -> tuple[Array, Mask]:
-        """Return where Newton's own steps lead from positions (n, V), and which get there."""
-        q, good = q.copy(), np.asarray(np.isfinite(q).all(axis=0))
-        some = np.flatnonzero(good)
+        """Return where Newton's own steps lead from positions (n, V), and which get there.
+
+        Where Phi_q is singular a position may be unknown.
+        """
+        q, good = begin.copy(), np.asarray(np.isfinite(begin).all(axis=0))
+        some, inputs = np.flatnonzero(good), self.inputs
+        if some.size and inputs.code.march is not None and reach == np.inf:
+            here = replace(inputs, t=inputs.t[:1], max_iterations=most)
+            march = self.march(variants[some])
+            motions = Motion.over(here, some.size)
+            motions.march_compiled(here, march, q[:, some], self.p[variants[some]])
+            status = motions.status[0]
+            q[:, some] = motions.states[0, :, 0]
+            good[some] = (status == Status.CONVERGED) | (status == Status.SINGULAR)
+            # Whether a position or its rates have no values compiled code does not say.
+            some = some[status == Status.NOT_FINITE]
+            q[:, some] = begin[:, some]
         if some.size:
             march = self.march(variants[some])
-            found = march.correct_together(q[:, some], float(self.inputs.t[0]), most, reach)
+            found = march.correct_together(q[:, some], float(inputs.t[0]), most, reach)
             q[:, some], good[some] = found.point.q, found.good
         return q, good

@@ -97,31 +97,50 @@ class _Pattern:
     rows: Places  # (nnz,)
     columns: Places
     numbers: Array  # (nnz,): what never changes; NaN where it varies
-    # Of each row its entries, their columns, and the places of these in a matrix.
-    by_row: list[tuple[Places, Places, tuple[Places, ...]]]
-    # Each pivot, the columns that it is coupled with then, and their places in a matrix.
-    order: list[tuple[int, Places, tuple[Places, ...]]]
+    rows_of: list[Places]  # of each row its entries
+    # The normal equations: entries of the lower triangle that are not zero, each a number. What is
+    # added to it: two entries of Phi_q.
+    products: list[tuple[int, int, int]]
+    # Each pivot, its number, the columns that it is coupled with then, with the numbers of these
+    # entries; and what loses a product of two of them: its number, and theirs.
+    order: list[tuple[int, int, list[tuple[int, int]], list[tuple[int, int, int]]]]
+    diagonal: Places  # numbers of the diagonal's entries
+    count: int  # of all entries
 
 
 def _pattern_of(code: Compiled) -> _Pattern:
     """Return the pattern of a module: eliminated first is what is coupled with fewest others."""
     rows, columns, numbers = (np.array(x) for x in zip(*code.entries, strict=True))
-    own = _Pattern(rows, columns, numbers.astype(np.float64), [], [])
-    coupled: dict[int, set[int]] = {column: set() for column in range(len(code.coordinates))}
-    for row in range(len(code.equations)):
-        entries = np.flatnonzero(rows == row)
-        among = columns[entries]
-        own.by_row.append((entries, among, np.ix_(among, among)))
-        for column in among.tolist():
-            coupled[column].update(among.tolist())
+    places: dict[tuple[int, int], int] = {}
+
+    def number_of(i: int, j: int) -> int:
+        return places.setdefault((max(i, j), min(i, j)), len(places))
+
+    n = len(code.coordinates)
+    coupled: dict[int, set[int]] = {column: set() for column in range(n)}
+    diagonal = np.array([number_of(column, column) for column in range(n)])
+    rows_of = [np.flatnonzero(rows == row) for row in range(len(code.equations))]
+    products, order = [], []
+    for entries in rows_of:
+        among = list(zip(entries.tolist(), columns[entries].tolist(), strict=True))
+        for k, (first, i) in enumerate(among):
+            coupled[i].update(j for _, j in among)
+            products += [(number_of(i, j), first, second) for second, j in among[k:]]
     while coupled:
         pivot = min(coupled, key=lambda column: len(coupled[column]))
-        others = coupled.pop(pivot) - {pivot}
+        others = sorted(coupled.pop(pivot) - {pivot})
         for column in others:
-            coupled[column] = (coupled[column] | others) - {pivot}
-        places = np.array(sorted(others), dtype=np.intp)
-        own.order.append((pivot, places, np.ix_(places, places)))
-    return own
+            coupled[column] = coupled[column].union(others) - {pivot}
+        below = [(i, number_of(i, pivot)) for i in others]
+        updates = [
+            (number_of(i, j), first, second)
+            for k, (i, first) in enumerate(below)
+            for j, second in below[k:]
+        ]
+        order.append((pivot, int(diagonal[pivot]), below, updates))
+    return _Pattern(
+        rows, columns, numbers.astype(np.float64), rows_of, products, order, diagonal, len(places)
+    )
 
 
 class _Attempts:
@@ -132,7 +151,7 @@ class _Attempts:
     ) -> None:
         self._code, self._pattern, self._t, self._p = equations.code, pattern, t, sets
         self._reference = equations.reference[:, np.newaxis]
-        self._limit = np.broadcast_to(equations.limit, len(pattern.by_row))[:, np.newaxis]
+        self._limit = np.broadcast_to(equations.limit, len(pattern.rows_of))[:, np.newaxis]
         self._most = self._reference * np.where(self._code.angular, LARGEST_ANGLE, 1.0)[:, None]
         self._scales = self._reference[pattern.columns]
         # (m, nnz): adds up what the entries of each row contribute.
@@ -151,7 +170,7 @@ class _Attempts:
 
     def matrices(self, q: Array) -> Array:
         """Return Phi_q, (N, m, n), of all problems at positions (N, n)."""
-        found = np.zeros((len(q), len(self._pattern.by_row), q.shape[1]))
+        found = np.zeros((len(q), len(self._pattern.rows_of), q.shape[1]))
         entries = self._evaluate(q.T, np.arange(len(q)))[1]
         found[:, self._pattern.rows, self._pattern.columns] = entries.T
         return found
@@ -220,21 +239,30 @@ def _directions(
 
     And by which part of itself the square of each residual would fall, if equations were linear.
     """
-    n = len(pattern.order)
-    normal, sides = np.zeros((n, n, size.size)), np.zeros((n, size.size))
-    for right, (own, columns, places) in zip(residual, pattern.by_row, strict=True):
-        values = entries[own]
-        normal[places] += values[:, np.newaxis] * values
-        sides[columns] -= values * right
-    normal[np.arange(n), np.arange(n)] += BEND * np.minimum(1.0, size)
-    found = sides.copy()
-    for pivot, others, places in pattern.order:
-        factors = normal[others, pivot] / normal[pivot, pivot]
-        normal[places] -= factors[:, np.newaxis] * normal[pivot, others]
-        found[others] -= factors * found[pivot]
-    for pivot, others, _ in reversed(pattern.order):
-        found[pivot] -= (normal[pivot, others] * found[others]).sum(axis=0)
-        found[pivot] /= normal[pivot, pivot]
+    normal, sides = np.zeros((pattern.count, size.size)), np.zeros((len(pattern.order), size.size))
+    part = np.empty(size.size)
+    for place, first, second in pattern.products:
+        np.multiply(entries[first], entries[second], out=part)
+        normal[place] += part
+    for right, among in zip(residual, pattern.rows_of, strict=True):
+        for k in among:
+            np.multiply(entries[k], right, out=part)
+            sides[pattern.columns[k]] -= part
+    normal[pattern.diagonal] += BEND * np.minimum(1.0, size)
+    found, factors = sides.copy(), normal.copy()
+    for pivot, own, below, updates in pattern.order:
+        for i, place in below:
+            factors[place] = normal[place] / normal[own]
+            np.multiply(factors[place], found[pivot], out=part)
+            found[i] -= part
+        for place, first, second in updates:
+            np.multiply(factors[first], normal[second], out=part)
+            normal[place] -= part
+    for pivot, own, below, _ in reversed(pattern.order):
+        found[pivot] /= normal[own]
+        for i, place in below:
+            np.multiply(factors[place], found[i], out=part)
+            found[pivot] -= part
     return found, (found * sides).sum(axis=0) / size**2
 
 

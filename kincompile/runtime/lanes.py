@@ -81,8 +81,14 @@ def take_on(
         is_stuck |= locked
         if is_stuck.any():
             status = np.where(is_over, Status.NOT_CONVERGED, Status.NOT_REACHED)
-            status[march.bifurcation(lanes.state, target, smallest)] = Status.SINGULAR
             status[locked] = Status.LOCK_UP
+            others = np.flatnonzero(is_stuck & ~locked)
+            if others.size:
+                own = lanes.some(others)
+                is_one = march_of(own.motions).bifurcation(
+                    own.state, target[others], smallest[others]
+                )
+                status[others[is_one]] = Status.SINGULAR
             ends.append(lanes.some(is_stuck))
             over.append(status[is_stuck])
         size = march.pace(lanes.state, forward, step, good, smallest)

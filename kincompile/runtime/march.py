@@ -18,9 +18,11 @@ import numpy as np
 
 from kincompile.criteria import (
     ALLOWED_PART,
+    BEFORE,
     BEFORE_LOCK_UP,
     BEYOND,
     GROWN,
+    GROWTH,
     KINK,
     LARGE_ERROR,
     LAST_CORRECTION,
@@ -31,6 +33,7 @@ from kincompile.criteria import (
     PATIENCE,
     RESIDUAL_FACTOR,
     ROUNDING,
+    SHORTER,
     SINGULAR_SENSITIVITY,
     SMALL_ERROR,
     SMALLEST_PART,
@@ -57,13 +60,6 @@ CLOSE = 0.1
 
 SOON = 0.1
 """Part of the time of a movement in which velocities that grow end it soon."""
-
-GROWTH = 1.5
-"""By what a step of a batch is longer than the one before it."""
-
-BEFORE, SHORTER = 0.75, 8.0
-"""Part of the way to where velocities end, as they grow, that a step goes there, and by what a step
-is shorter at most than the one before it."""
 
 SAME_DETERMINANT = 0.5
 """Part of a determinant down to which Phi_q counts as no nearer to singular."""
@@ -295,7 +291,7 @@ class March:
             ends &= np.isfinite(sum(row for row in there) + np.zeros(speed.shape))
         return ends
 
-    def bifurcation(self, state: State, t: Any, smallest: Array) -> Any:
+    def bifurcation(self, state: State, t: Array, smallest: Array) -> Any:
         """Say of a batch that cannot be taken on by its smallest step where it is at a bifurcation.
 
         Phi_q is nearly singular there, and the motion goes on as it was predicted beyond where a
@@ -303,7 +299,7 @@ class March:
         or where equations are left out, which may forbid one of the ways.
         """
         if self.equations.code.redundant:
-            return False
+            return np.zeros(smallest.shape, dtype=bool)
         pace = self.time_of(state)
         ahead = np.maximum(BEYOND * pace, LEFT * smallest)
         forward = np.copysign(ahead, t - state.t)

@@ -36,9 +36,9 @@ STATUSES = {
 """What becomes of a point, and the numbers that say so in all languages."""
 
 CRITERIA = (
-    "AGREEMENT", "BEFORE_LOCK_UP", "FARTHEST", "GROWN", "KINK", "LEFT", "NEARLY_SINGULAR",
-    "RESIDUAL_FACTOR", "ROUNDING", "SMALL_ERROR", "SMALLEST_PART", "SMOOTH", "SOLVED",
-    "TOO_NEAR",
+    "AGREEMENT", "BEFORE", "BEFORE_LOCK_UP", "FARTHEST", "GROWN", "GROWTH", "KINK", "LEFT",
+    "NEARLY_SINGULAR", "RESIDUAL_FACTOR", "ROUNDING", "SHORTER", "SMALL_ERROR", "SMALLEST_PART",
+    "SMOOTH", "SOLVED", "TOO_NEAR",
 )  # fmt: skip
 COUNTS = ("MAX_CORRECTIONS", "MAX_SUBSTEPS")
 """The numbers of `criteria` that the march judges by; and the whole ones."""

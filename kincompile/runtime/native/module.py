@@ -53,7 +53,6 @@ if TYPE_CHECKING:
 BATCH_LAST = ("Phi", "nonzeros", "nu", "gamma")
 """What `kinematics_batch_last` returns."""
 
-
 LINE = 64 // NUMBER
 """Numbers of a cache line: C writes whole lines past the caches, in a third of the time."""
 
@@ -74,6 +73,8 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     if "solve" in names:
         compiled["solve"] = functions.solve(names["_system"])
         compiled["compiled_march"] = functions.march()
+        lanes = names["LANES"]
+        names["LANES"] = {**lanes, "position": functions.position_of_lanes(lanes["position"])}
     if "observe" in names:
         compiled["observe_into"] = functions.observe_into()
     for name, function in compiled.items():
@@ -211,6 +212,32 @@ class _Functions:
     which saves the time to fetch memory and to write the entries that never change.
     """
         return kinematics_batch_last
+
+    def position_of_lanes(self, original: Function) -> Function:
+        """Return `position` of the code itself: compiled, for arrays of positions (n, N)."""
+        m, entries = self._m, self._code.entries
+        varying = [m + k for k, (*_, number) in enumerate(entries) if number is None]
+        rows = [*range(m), *varying]
+
+        def position(f: Any, q: Any, t: Any, p: Any) -> Sequence[Any]:
+            shape: tuple[int, ...] = getattr(q, "shape", ())
+            if not (
+                len(shape) == 2
+                and _is_real(q, shape)
+                and isinstance(p, np.ndarray)
+                and (_is_real(p, (len(p),)) or _is_real(p, (len(p), shape[1])))
+                and (isinstance(t, float) or _is_real(t, shape[1:]))
+            ):
+                written: Sequence[Any] = original(f, q, t, p)
+                return written
+            values, time = np.empty((m + len(entries), shape[1])), np.asarray(t)
+            batch = self._batch_type(shape[1], numbers_of_batch(q))
+            batch.t, batch.p = numbers_of_times(time), numbers_of_batch(p)
+            batch.Phi, batch.nonzeros = map(numbers_of_batch, (values[:m], values[m:]))
+            self._run(byref(batch))
+            return [values[row] for row in rows]
+
+        return position
 
     def _checked(self, out: Any, sizes: Sequence[int], points: int | None = None) -> Any:
         """Return the arrays of an earlier call, or None where none are given."""

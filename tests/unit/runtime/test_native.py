@@ -321,6 +321,22 @@ def test_the_order_of_convergence_is_that_of_newton(four_bar):
     assert counts[-1] <= 2
 
 
+def test_the_code_of_lanes_agrees(example):
+    """Compiled for arrays of positions; what is not finite stays in its lane."""
+    native, module = example.native, example.module
+    q, _, t = states(module, 40)
+    q[7, 0] = np.nan
+    sets = np.ascontiguousarray((module.DEFAULTS * np.linspace(1, 1.1, 40)[:, np.newaxis]).T)
+    for time, p in ((t, module.DEFAULTS), (0.3, sets), (t, sets)):
+        for rows in (q.T, np.ascontiguousarray(q.T), q.T + 0j):
+            with np.errstate(all="ignore"):
+                found, expected = (
+                    [np.broadcast_to(row, 40) for row in position(module.ARRAYS, rows, time, p)]
+                    for position in (native.LANES["position"], module.LANES["position"])
+                )
+            np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-11)
+
+
 # ---------------------------------------------------------------- variants
 
 
@@ -343,6 +359,16 @@ def test_variants_agree_with_those_of_numpy_and_bad_ones_disturb_none(four_bar, 
     assert 60 <= good.sum() < 75
     alone = kc.solve(native, times, sets[50])
     np.testing.assert_allclose(found.q_ddot[50], alone.q_ddot, rtol=1e-10, atol=1e-10)
+
+
+def test_steps_towards_a_lock_up_are_as_long_as_velocities_allow(four_bar):
+    native, module = four_bar
+    sets = np.tile([20.0, 15.0, 18.0, 20.0, 1.5], (40, 1)) * np.linspace(0.99, 1, 40)[:, None]
+    guess = kc.newton(module, 0.4, None, sets[0]).q
+    found = kc.solve(native, np.linspace(0.4, 4, 30), sets[:, np.newaxis], guess)
+    locked = found.status == kc.Status.LOCK_UP
+    assert locked.any(axis=1).all()
+    assert found.iterations[locked].max() <= 100  # 158 and more where steps are halved and doubled
 
 
 def test_variants_of_every_example(example):

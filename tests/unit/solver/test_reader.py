@@ -17,7 +17,7 @@ REFUSED = {
     ),
     "a field that is none": ("o.residual = 0.0", "o.residuals = 0.0", "Outcome has no residuals"),
     "a statement that is none": (
-        "        take_up(at, alone, 0)\n        is", "        del at\n        is",
+        "            take_up(at, alone, 0)\n        else", "            del at\n        else",
         "Delete is no stat"
     ),
     "an expression that is none": ("PATTERN[e][0]\n", "[x for x in PATTERN][0]\n", "no expression"),
@@ -50,7 +50,7 @@ REFUSED = {
     "a loop that goes beyond an array": (
         "1.0 if ANGULAR[i]", "1.0 if IS_REDUNDANT[i]", "goes to N, and there are M"
     ),
-    "a truth for a number": ("h *= 2.0 if is_good", "h *= True if is_good", "bool and real do not"),
+    "a truth for a number": ("h = size if h > 0.0", "h *= True if h > 0.0", "bool and real do not"),
     "a real number for a whole one": (
         "    iterations: Int = 0\n", "    iterations: Int = 0.0\n", "real, where int"
     ),
