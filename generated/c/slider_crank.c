@@ -792,8 +792,8 @@ static const int IS_REDUNDANT[] = {
 // At a lock-up velocities grow as one over the root of the time that is left: it is at most LEFT
 // smallest steps, they have GROWN by so much, and it is so far before the time to be reached.
 static const double LEFT = 64.0, GROWN = 8.0, BEFORE_LOCK_UP = 0.0001;
-// By what a step is longer than one that was good, the part that it goes of the way to where
-// velocities end, and by what it is shorter at most.
+// Factor of the step after a good one, largest part of the way to where growing velocities end, and
+// largest factor by which a step becomes shorter.
 static const double GROWTH = 1.5, BEFORE = 0.75, SHORTER = 8.0;
 // Newton iterations of a predicted point, sub-steps between two times.
 enum { MAX_CORRECTIONS = 6, MAX_SUBSTEPS = 10000 };
