@@ -38,6 +38,9 @@ from kincompile.files.file_format import model_schema as model_schema
 from kincompile.files.files import read as read
 from kincompile.files.files import read_analysis as read_analysis
 from kincompile.files.files import read_model as read_model
+from kincompile.functions.poses import Poses as Poses
+from kincompile.functions.transmission import Transmission as Transmission
+from kincompile.functions.transmission import transmission as transmission
 from kincompile.model import motion as motion
 from kincompile.model import outputs as outputs
 from kincompile.model.catalogue import *

@@ -2,6 +2,8 @@
 
 import math
 
+import sympy
+
 import kincompile as kc
 from kincompile import spatial
 from kincompile.spatial import outputs
@@ -60,10 +62,9 @@ def ankle_with_rods():
     return m
 
 
-def five_bar(*, second=0.9):
+def five_bar(*, second=0.9, end=(-0.0024, 0.0956)):
     """Return T6; without a value its second motor is free."""
-    m = kc.Mechanism("five_bar")
-    end, rods = (-0.0024, 0.0956), []
+    m, rods = kc.Mechanism("five_bar"), []
     for number, x, turned in ((1, -0.059, 2.3), (2, 0.059, 0.9)):
         elbow = x + 0.09 * math.cos(turned), 0.09 * math.sin(turned)
         slope = math.atan2(end[1] - elbow[1], end[0] - elbow[0])
@@ -77,3 +78,26 @@ def five_bar(*, second=0.9):
     m.add(kc.Revolute("P", rods[0], (0.12, 0), rods[1], (0.12, 0)))
     m.point("end", rods[0], (0.12, 0))
     return m
+
+
+def differential():
+    """Return T7a, two equations of free coordinates."""
+    u_1, u_2, x_1, x_2 = sympy.symbols("m_1 m_2 x_1 x_2")
+    first, second = u_1 / 50, u_2 / -60
+    equations = x_1 - (first + second) / 4 - 0.1, x_2 - (first - second) / 3 + 0.2
+    return kc.ConstraintSystem("differential", "m_1 m_2 x_1 x_2", equations)
+
+
+def remote_drive():
+    """Return T7b, the "four-bar linkage" transmission of ros2_control."""
+    u_1, u_2, x_1, x_2 = sympy.symbols("m_1 m_2 x_1 x_2")
+    equations = x_1 - u_1 / 100 - 0.1, 1.5 * (x_2 + 0.2) - (u_2 / -60 - u_1 / 100)
+    return kc.ConstraintSystem("remote_drive", "m_1 m_2 x_1 x_2", equations)
+
+
+def bevel_wrist():
+    """Return T7c: its inputs are the motors, its side bevels turn half as fast."""
+    u_1, u_2, x_1, x_2 = sympy.symbols("m_1 m_2 x_1 x_2")
+    sides = u_1 / 2, u_2 / 2
+    equations = x_1 - (sides[0] + sides[1]) / 2, x_2 - (sides[0] - sides[1]) * 2 / 3
+    return kc.ConstraintSystem("bevel_wrist", "m_1 m_2 x_1 x_2", equations)

@@ -79,7 +79,7 @@ def with_inputs(
         parameters.append(Parameter(symbol.name, value, unit))
     given = {name: _given(valued[name]) for name in names if name in valued}
     changed = [given.get(item.name, item) for item in system.constraints]
-    return system.rewritten(changed, more, parameters), names
+    return system.rewritten(changed, more, (*system.parameters, *parameters)), names
 
 
 def _unknown(system: ConstraintSystem, names: Sequence[str], known: Sequence[str]) -> list[str]:

@@ -208,24 +208,29 @@ class ConstraintSystem(MatrixViews, TextViews):
         self,
         constraints: Sequence[Joint | FreeEquation],
         more: Sequence[Constraint | Equation],
-        parameters: Sequence[Parameter] = (),
+        parameters: Sequence[Parameter] | None = None,
+        outputs: Sequence[Output] = (),
     ) -> ConstraintSystem:
-        """Return the system with its constraints changed, more of them and of parameters.
+        """Return the system with these constraints and more of them, and with more outputs.
 
-        It has no loads.
+        It has no loads, and other parameters where these are given.
 
         Raises
         ------
         ModelError
             If one of those that come new cannot be used as written.
         """
-        every = (*self.parameters, *parameters)
+        every = self.parameters if parameters is None else tuple(parameters)
         scope = _scope(self.bodies, self.coordinates, every, [], self.ground)
         found = beside_drivers([*constraints, *_resolved(list(more), scope)])
+        seen = resolved_observers((), outputs, scope, self.length_unit)
         if scope.problems:
             raise ModelError(scope.problems)
         names = tuple(name for item in found for name in item.equation_names)
-        changed = {"constraints": found, "equations": names, "parameters": every, "loads": ()}
+        changed = {
+            "constraints": found, "equations": names, "parameters": every, "loads": (),
+            "observers": (*self.observers, *seen),
+        }  # fmt: skip
         return self._with(changed)
 
     def _with(self, changed: Mapping[str, Any]) -> ConstraintSystem:

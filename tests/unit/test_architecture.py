@@ -47,6 +47,7 @@ FLOORS = {
     "view": 9,
     "derivations": 10,
     "design": 10,
+    "functions": 10,
     "exercises": 11,
     "__init__": 12,
     "cli": 13,

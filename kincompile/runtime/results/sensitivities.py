@@ -348,6 +348,10 @@ class _Asked:
         every = every_q, every_q_dot, np.concatenate((q_ddot, solved(gamma[:, m:])), axis=1)
         found = np.array(every)[..., n:].reshape(3, -1, k, n)
         if outputs := self.code.outputs:
+            # As motions of one point each, where each has parameters of its own.
+            if p.ndim > 1:
+                first, rates, second = (part[:, np.newaxis] for part in every)
+                every, t = (first, rates, second), t[:1]
             seen = observed(larger, every, t, p)
             y = np.array((seen.y, seen.y_dot, seen.y_ddot))[..., len(outputs) :]
             found = np.concatenate((found, y.reshape(3, -1, k, len(outputs))), axis=-1)

@@ -1,0 +1,1 @@
+"""Loops as functions: their values, derivatives, inverse and limits, at run time."""
