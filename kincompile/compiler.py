@@ -72,6 +72,7 @@ def emit(
     *,
     sensitivities: Sequence[str] = (),
     dynamics: bool = False,
+    transmission: tuple[Sequence[str], Sequence[str]] | None = None,
 ) -> Emitted:
     """Compile a mechanism to source files.
 
@@ -94,6 +95,11 @@ def emit(
         Whether the files have the right side of the equations of motion too, for any integrator:
         ``accelerations(q, q_dot, t, p)`` and ``multipliers``, of a mechanism whose bodies have
         masses, with as many degrees of freedom as it likes.
+    transmission
+        Names of inputs, drivers or coordinates, and of outputs, coordinates, outputs or points: the
+        file is then the mechanism as a function from the one to the other, and nothing else.
+        ``<name>_transmission(state, u)`` gives x, its Jacobian J by u and a status; it goes on from
+        the last position, which the caller keeps.
 
     Returns
     -------
@@ -108,7 +114,8 @@ def emit(
     ModelError
         If the model cannot be used as written; every problem is listed.
     InputError
-        If it has no parameter of a name, or with `dynamics` no masses.
+        If it has no parameter of a name, or with `dynamics` no masses; with `transmission`, if it
+        has no input or output of a name, or the inputs do not determine the outputs.
     StructuralError
         With `dynamics`, if a body has no mass, or constraints contradict each other.
     UnsupportedError
@@ -117,6 +124,13 @@ def emit(
     """
     _check_target(target, form)
     system = system_of(model)
+    if transmission is not None:
+        if form == "grouped" or sensitivities or dynamics:
+            raise UnsupportedError(
+                "a transmission is a file of its own, written out, without sensitivities and "
+                "equations of motion; leave out what is asked for beside it"
+            )
+        return _transmission(system, target, *transmission)
     with _without_collector(system):
         if form == "grouped" and (sensitivities or dynamics):
             what = "sensitivities" if sensitivities else "equations of motion"
@@ -136,6 +150,33 @@ def emit(
         from kincompile.emitters.numpy.march import with_march
 
         return with_march(emitted, code.program)
+
+
+def _transmission(
+    system: ConstraintSystem, target: str, inputs: Sequence[str], outputs: Sequence[str]
+) -> Emitted:
+    """Return the files of a mechanism as a function of its inputs."""
+    from kincompile.emitters.transmission_emission import emit_transmission, require_transmission
+    from kincompile.ir.transmission import transmission_code
+    from kincompile.transmissions.loop import loop_of
+
+    require_transmission(target)
+    loop = loop_of(system, inputs, outputs)
+    code = _lowered(loop.system, "inline")
+    assert isinstance(code, InlineProgram)
+    _require_small(code.program, "transmissions", "take")
+    names = dict(zip(loop.parameters, loop.inputs, strict=True))
+    q = _assembled(loop.system)
+    if q is None:
+        raise InputError(
+            f"no position of {system.name} was found where a transmission begins, at the values "
+            "that its drivers have at t = 0: give a better guess."
+        )
+    found = transmission_code(code, names, loop.outputs, q.tolist())
+    defaults = {x.name: float(x.default or 0.0) for x in code.program.parameters}
+    return emit_transmission(
+        target, found, [q[k] for k in found.free], [defaults[name] for name in names]
+    )
 
 
 @contextmanager

@@ -158,6 +158,13 @@ SMALL_ERROR, LARGE_ERROR = 0.05, 0.5
 """Errors that are always and never good. Near a lock-up the predicted movement is tens of radians,
 and a part of it proves nothing."""
 
+STEEPEST = 1e4
+"""Slope of a coordinate by an input of a transmission, in scales, from which its position counts as
+singular: nearer ones have rounding errors as large as the last correction."""
+
+LONGEST_PART = 4.0
+"""Part of the last way of a transmission's inputs up to which positions are extrapolated by it."""
+
 ALLOWED_PART = 0.25
 """Error, as a part of the predicted movement, that is good in between."""
 

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from kincompile.emitters.target import Emitted, Target
+    from kincompile.emitters.transmission import TransmissionTarget
     from kincompile.ir.grouping import GroupedProgram
 
 
@@ -23,17 +24,18 @@ class Listed:
     endings: tuple[str, ...]  # endings of its files, that of the main one first
     is_loadable: bool = False  # whether this process can call its code
     has_grouped_form: bool = False  # whether it has a form for large mechanisms
+    has_transmission: bool = False  # whether its folder has a module `transmission`
 
 
 TARGETS = {
     "numpy": Listed(
         "kincompile.emitters.numpy", (".py",),
-        is_loadable=True, has_grouped_form=True,
+        is_loadable=True, has_grouped_form=True, has_transmission=True,
     ),
-    "c": Listed("kincompile.emitters.c", (".c", ".h"), is_loadable=True),
-    "octave": Listed("kincompile.emitters.octave", (".m",)),
-    "javascript": Listed("kincompile.emitters.javascript", (".js",)),
-    "rust": Listed("kincompile.emitters.rust", (".rs",)),
+    "c": Listed("kincompile.emitters.c", (".c", ".h"), is_loadable=True, has_transmission=True),
+    "octave": Listed("kincompile.emitters.octave", (".m",), has_transmission=True),
+    "javascript": Listed("kincompile.emitters.javascript", (".js",), has_transmission=True),
+    "rust": Listed("kincompile.emitters.rust", (".rs",), has_transmission=True),
 }  # fmt: skip
 """Languages to emit."""
 
@@ -42,6 +44,12 @@ def load_target(name: str) -> Target:
     """Return a target, whose modules are loaded now."""
     target: Target = import_module(f"{TARGETS[name].folder}.target")
     return target
+
+
+def load_transmission(name: str) -> TransmissionTarget:
+    """Return what writes the transmission of a target."""
+    language: TransmissionTarget = import_module(f"{TARGETS[name].folder}.transmission")
+    return language
 
 
 def load_grouped_form(name: str) -> Callable[[GroupedProgram], Emitted]:

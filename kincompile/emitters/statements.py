@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from kincompile.emitters.evaluators import frames_title, inputs_read
@@ -38,6 +38,10 @@ class Statements:
     # kept, taken: how a truth is kept among numbers, and how it is taken from there
     kept: str = "{}"
     taken: str = "{}"
+
+    def of_pose(self, element: str, entry: str) -> Statements:
+        """Return the same for one point, with another form of elements and entries."""
+        return replace(self, element=element, entry=entry)
 
     def header(self, code: InlineProgram) -> str:
         """Return the comment at the top of a file: coordinates, parameters, rows."""

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import NOISE, probe_of, rounded, size_of, turning
+from kincompile.criteria import NOISE, SLIGHT, probe_of, rounded, size_of, turning
 from kincompile.ir.graph import Constant, Graph, Node
 from kincompile.ir.inline import input_name
-from kincompile.ir.interpret import evaluator
+from kincompile.ir.interpret import apply, evaluator
 from kincompile.ir.looks import Look, parts_of
 from kincompile.structure.blocks import Block, block_triangular
 
@@ -83,6 +83,20 @@ class Sizes:
             return self.values.get((row, column), math.nan)
         return float(value) * self.scales.get(column, 1.0)
 
+    def measure(self, graph: Graph, matrix: Matrix) -> None:
+        """Take the values of all entries of a matrix at the position, from those it began with."""
+        scales = self.scales
+        given = {input_name(*k): x / scales.get(k[1], 1.0) for k, x in self.values.items()}
+        found: list[Any] = []
+        with np.errstate(all="ignore"):
+            for operation, *operands in graph.nodes:
+                unknown = operation == "input" and operands[0] not in given
+                found.append(np.nan if unknown else apply(operation, operands, found, given, {}))
+        for row, entries in matrix.items():
+            for column, node in entries.items():
+                value = float(found[node]) * scales.get(column, 1.0)
+                self.values[row, column], self.entries[row, column] = value, abs(value)
+
     def weights(self) -> dict[int, float]:
         """Return weights by which rows count alike: powers of two, the same on every processor."""
         terms: dict[int, float] = {}
@@ -127,10 +141,13 @@ class SolvePlan:
         return any(len(block.rows) > self.straight for block in self.blocks)
 
 
-def plan_solve(code: InlineProgram, *, is_straight: bool = False) -> SolvePlan | None:
+def plan_solve(
+    code: InlineProgram, *, is_straight: bool = False, near: Sequence[float] | None = None
+) -> SolvePlan | None:
     """Plan the solve of the independent equations; None where they are structurally singular.
 
-    Redundant equations are left out: that they are met is for the solver to check.
+    Redundant equations are left out: that they are met is for the solver to check. Pivots are
+    judged at a generic position, or near one that is given, where by symmetry some may vanish.
     `is_straight` is for code that may not call LAPACK: larger blocks are eliminated too, with
     pivots that vary. The determinants are then these pivots.
     """
@@ -147,12 +164,16 @@ def plan_solve(code: InlineProgram, *, is_straight: bool = False) -> SolvePlan |
         left_out=left_out,
         is_straight=is_straight,
         turn=turn,
-        sizes=sizes_of(code),
+        sizes=sizes_of(code, near),
+        is_near=near is not None,
     )
 
 
-def sizes_of(code: InlineProgram) -> Sizes:
-    """Return the sizes of the entries of Phi_q where the runtime measures its equations too."""
+def sizes_of(code: InlineProgram, near: Sequence[float] | None = None) -> Sizes:
+    """Return the sizes of the entries of Phi_q where the runtime measures its equations too.
+
+    Or beside a position that is given.
+    """
     program = code.program
     guess = np.array([item.guess for item in program.coordinates])
     units = (item.unit for item in program.coordinates)
@@ -162,7 +183,9 @@ def sizes_of(code: InlineProgram) -> Sizes:
     with np.errstate(all="ignore"):
         size = float(rounded(size_of(evaluate, pattern, angular, guess))) or 1.0
         scales = np.where(angular, 1.0, size)
-        entries = evaluate(guess + scales * probe_of(guess.size))[1] * scales[pattern[:, 1]]
+        probe = scales * probe_of(guess.size)
+        place = guess + probe if near is None else np.array(near) + SLIGHT * probe
+        entries = evaluate(place)[1] * scales[pattern[:, 1]]
     values = np.nan_to_num(entries, posinf=0.0, neginf=0.0)
     sizes, known = (
         dict(zip(code.pattern(), found.tolist(), strict=True)) for found in (np.abs(values), values)
@@ -184,11 +207,13 @@ def plan_entries(
     is_straight: bool = False,
     turn: Turn | None = None,
     sizes: Sizes | None = None,
+    is_near: bool = False,
 ) -> SolvePlan | None:
     """Plan the solve of a matrix given by its entries, each a number or, where it varies, None.
 
     Rows that are left out are inputs that nothing reads. `turn` replaces the Euler parameters of
-    bodies by small rotations. Pivots are judged by the sizes of entries where these are known.
+    bodies by small rotations. Pivots are judged by the sizes of entries where these are known;
+    those of small rotations are where the plan is for the neighbourhood of one position.
     """
     graph, sizes = Graph(), sizes or Sizes()
     matrix, varying = matrix_of(graph, row_count, entries)
@@ -198,6 +223,8 @@ def plan_entries(
         del matrix[row]
     pivots, eliminated = _eliminate(graph, matrix, right, sizes)
     rotations = [] if turn is None else turn(graph, matrix, right)
+    if is_near:
+        sizes.measure(graph, matrix)
     rows = sorted(matrix)
     settled = {pivot.column for pivot in pivots}.union(*(item.columns for item in rotations))
     columns = sorted(set(range(column_count)) - settled)

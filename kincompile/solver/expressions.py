@@ -224,7 +224,7 @@ class Expressions:
             return TYPES.get(text) or Type(text)
         if word in ("Row", "Rows") and size in SIZES:
             return Type("real", (size,) if word == "Row" else (size, LANE))
-        if word == "Matrix" and {*size.split(", ")} <= {*ROOM}:
+        if word == "Matrix" and {*size.split(", ")} <= {*ROOM, *SIZES}:
             return Type("real", tuple(size.split(", ")))
         if text == "Vector[Int]":
             return Type("int", ("any",))

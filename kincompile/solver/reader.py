@@ -67,6 +67,12 @@ def start() -> Text:
     return text
 
 
+@cache
+def transmission() -> Text:
+    """Return the text of a transmission, read once."""
+    return read(source_of("transmission"))
+
+
 def place_of(name: str) -> Traversable:
     """Return where a module of a text is."""
     return files("kincompile.solver") / f"{name}.py"

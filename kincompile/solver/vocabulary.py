@@ -22,8 +22,9 @@ TYPES = {
 }
 """Annotations. ``Row[N]``, ``Rows[N]`` and ``Vector[Int]`` are read beside them."""
 
-SIZES = ("N", "M", "K", "LANES", "NONZEROS", "BLOCKS")
-"""Coordinates, equations, parameters, points at once, entries of Phi_q, blocks of its solve."""
+SIZES = ("N", "M", "K", "LANES", "NONZEROS", "BLOCKS", "U", "X", "ONE")
+"""Coordinates, equations, parameters, points at once, entries of Phi_q, blocks of its solve; inputs
+and outputs of a transmission; 1."""
 
 ROOM = ("TALL", "WIDE")
 """Rows and columns of a matrix of least squares: M + N, the equations and what bends a step, and
@@ -55,6 +56,14 @@ CAREFUL_COUNTS = ("MAX_ITERATIONS", "PATIENCE")
 CAREFUL_CRITERIA = ("ALLOWED_PART", "LARGE_ERROR", "SINGULAR_SENSITIVITY", "TINY")
 """Those that the careful march judges by besides; and STEEP."""
 
+TRANSMISSION_COUNTS = ("MAX_CORRECTIONS", "MAX_ITERATIONS", "MAX_SUBSTEPS")
+TRANSMISSION_CRITERIA = (
+    "KINK", "LARGE_ERROR", "LAST_CORRECTION", "LONGEST_PART", "NEARLY_SINGULAR", "NEAR_ANGLE",
+    "SMALLEST_PART",
+    "SMALL_ERROR", "SMOOTH", "SOLVED", "STEEPEST",
+)  # fmt: skip
+"""Those that a transmission judges by."""
+
 CAREFUL = "IS_CAREFUL"
 """Chooses, where the text is read, which of two marches it is."""
 
@@ -65,14 +74,16 @@ TABLES = {
     "PATTERN": Type("int", ("NONZEROS", "two")),
     "MAY_TURN": Type("bool", ("N",)),
     "COVER": Type("int", ("N",)),
+    "IS_ANGLE": Type("bool", ("U",)),
 }
 """Which coordinates are angles, which equations repeat others, numbers without a pattern (as many
 as there are coordinates or equations), the row and column of each entry of Phi_q; which coordinates
-are angles or may be, and of each the first of its body's Euler parameters (N: not one)."""
+are angles or may be, and of each the first of its body's Euler parameters (N: not one); which
+inputs of a transmission are angles."""
 
 CONSTANTS = (
     dict.fromkeys((*SIZES, *ROOM, *STATUSES, *COUNTS, *START_COUNTS, *CAREFUL_COUNTS), INT)
-    | dict.fromkeys((*CRITERIA, *START_CRITERIA, *CAREFUL_CRITERIA), REAL)
+    | dict.fromkeys((*CRITERIA, *START_CRITERIA, *CAREFUL_CRITERIA, *TRANSMISSION_CRITERIA), REAL)
     | dict.fromkeys(("NOTHING", "INFINITE", "TURN"), REAL)
     | TABLES
 )
@@ -105,6 +116,8 @@ WORDS = {
     "solve": Word(("Point", "rows"), "Rows[N]", is_lanewise=True),
     # what velocity and acceleration miss of their equations: sums of squares with weights
     "missed": Word(("Point", "rows", "Lane", "Lane"), is_lanewise=True, changes=(2, 3)),
+    # of a transmission: correction, slopes, outputs, J at a pose
+    "evaluate": Word(("Transmission", "Pose"), changes=(1,)),
     # of numbers
     "abs": Word(("number",), "same"),
     "finite": Word(("number",), "truth"),

@@ -247,6 +247,6 @@ CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE, NOT_REACHED, LOCK_UP = vocabular
 IS_CAREFUL = False
 
 # Until a mechanism gives its own:
-N = M = K = LANES = NONZEROS = BLOCKS = TALL = WIDE = 0
-ANGULAR = IS_REDUNDANT = PROBE = PATTERN = MAY_TURN = COVER = ()
-position = factor = nu = gamma = constants = solve = missed = any_lane
+N = M = K = U = X = ONE = LANES = NONZEROS = BLOCKS = TALL = WIDE = 0
+ANGULAR = IS_REDUNDANT = PROBE = PATTERN = MAY_TURN = COVER = IS_ANGLE = ()
+position = factor = nu = gamma = constants = solve = missed = evaluate = any_lane

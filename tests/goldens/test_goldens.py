@@ -39,6 +39,14 @@ GOLDEN = ("cam_by_table", "four_bar", "problem_3_5_6", "slider_crank")
 IN_SPACE = tuple(sorted(path.stem for path in (ROOT / "examples" / "space").glob("*.py")))
 WRITTEN = (*GOLDEN, "spatial_slider_crank")
 """Whose files are committed, of every target: those of the plane and the smallest in space."""
+TRANSMISSIONS = {
+    "four_bar": (["motor"], ["phi_rocker"]),
+    "stewart_gough": (
+        [f"leg_{k}" for k in range(1, 7)],
+        [f"{k}_platform" for k in ("x", "y", "z", "e0", "e1", "e2", "e3")],
+    ),
+}
+"""Mechanisms as functions: of the first the files are committed, of the other the digests."""
 FILES = [(target, name) for target in TARGETS for name in WRITTEN]
 OTHERS = sorted({*EXAMPLES, *IN_SPACE} - {*WRITTEN})
 
@@ -115,7 +123,14 @@ def rewritten(request, example_named):
         for target, name in FILES
         for file, text in example_named(name).files(target).items()
     }
+    model = example_named("four_bar").model
+    wanted |= {
+        f"{target}/{file}": text
+        for target in TARGETS
+        for file, text in transmission(model, target).items()
+    }
     lines = [digest(example_named(name), target) for name in OTHERS for target in TARGETS]
+    lines += [transmission_digest(example_named, target) for target in TARGETS]
     return update(GENERATED, wanted | {DIGESTS: "".join(lines)})
 
 
@@ -123,6 +138,17 @@ def digest(example: Any, target: str) -> str:
     """Return the line of digests.txt about what an example emits for a target."""
     text = "".join(example.files(target).values())
     return f"{hashlib.sha256(text.encode()).hexdigest()} {target} {example.path.stem}\n"
+
+
+def transmission(model: Any, target: str) -> Any:
+    """Return the files of a mechanism as a function of its inputs."""
+    return kc.emit(model, target, transmission=TRANSMISSIONS[system_of(model).name]).files
+
+
+def transmission_digest(example_named: Any, target: str) -> str:
+    """Return the line of digests.txt about the transmission in space."""
+    text = "".join(transmission(example_named("stewart_gough").model, target).values())
+    return f"{hashlib.sha256(text.encode()).hexdigest()} {target} stewart_gough_transmission\n"
 
 
 def update(folder: Path, files: dict[str, str]) -> list[str]:
@@ -150,9 +176,11 @@ def test_that_nothing_is_missing_and_nothing_extra(example_named):
     for target in TARGETS:
         found = [path for path in (GENERATED / target).iterdir() if path.name != "__pycache__"]
         wanted = [file for name in WRITTEN for file in example_named(name).files(target)]
+        wanted += transmission(example_named("four_bar").model, target)
         assert sorted(path.name for path in found) == sorted(wanted)
     about = [line.split()[1:] for line in read_text(GENERATED / DIGESTS).splitlines()]
-    assert about == [[target, name] for name in OTHERS for target in TARGETS]
+    listed = [[target, name] for name in OTHERS for target in TARGETS]
+    assert about == listed + [[target, "stewart_gough_transmission"] for target in TARGETS]
 
 
 @pytest.mark.skipif(not is_pinned(), reason="the bytes are those of the pinned SymPy")
@@ -171,6 +199,22 @@ def test_that_the_digests_are_those_of_what_is_emitted_today(example_named, othe
     lines = read_text(GENERATED / DIGESTS)
     missing = [x for x in TARGETS if digest(example_named(other), x) not in lines]
     assert not missing, f"what {other} emits for them has changed; make update-goldens, if meant"
+
+
+@pytest.mark.skipif(not is_pinned(), reason="the bytes are those of the pinned SymPy")
+@pytest.mark.parametrize("target", TARGETS)
+def test_that_transmissions_are_what_is_emitted_today(example_named, target):
+    for name, text in transmission(example_named("four_bar").model, target).items():
+        golden = read_text(GENERATED / target / name)
+        assert golden == text, "make update-goldens rewrites it, if it is meant"
+
+
+@pytest.mark.skipif(not is_pinned(), reason="the bytes are those of the pinned SymPy")
+@pytest.mark.slow
+def test_that_the_digests_of_transmissions_are_those_of_today(example_named):
+    lines = read_text(GENERATED / DIGESTS)
+    missing = [x for x in TARGETS if transmission_digest(example_named, x) not in lines]
+    assert not missing, "what stewart_gough emits as a transmission has changed"
 
 
 @pytest.mark.parametrize("golden_name", WRITTEN)

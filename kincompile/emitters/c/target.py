@@ -229,7 +229,7 @@ def _strip(
         largest = max((size for size in sizes if size > listing.plan.straight), default=0)
     data = {
         "is_planned": listing is not None,
-        "elementary": _elementary(code.program, called, largest),
+        "elementary": elementary(code.program, called, largest),
         "functions": "\n".join(lines),
         "results": indented(
             f"double {item.name}[{max(len(code.entries(item.name)), 1)}][LANES];"
@@ -239,7 +239,7 @@ def _strip(
     return fill("c/strip.c.jinja", data)
 
 
-def _elementary(program: Program, called: Collection[str], largest: int) -> str:
+def elementary(program: Program, called: Collection[str], largest: int) -> str:
     """Return what the code calls: functions of angles, splines, the solve of blocks of a size."""
     data = {
         "alone": [long for short, long in (("cos", "cosine"), ("sin", "sine")) if short in called],

@@ -47,7 +47,7 @@ class JavaScriptSolver(OneLane):
         "abs": "Math.abs", "finite": "Number.isFinite", "max": "Math.max", "min": "Math.min",
         "sqrt": "Math.sqrt", "position": "position_at", "nu": "nu_at", "gamma": "gamma_at",
         "factor": "prepare", "take_up": "copy_state", "put_at": "copy_state",
-        "floor": "Math.floor", "single": "rounded",
+        "evaluate": "evaluate_at", "floor": "Math.floor", "single": "rounded",
         # where a page wants to know what was met on the way
         "plain_step": "noted_step", "take": "take_and_note",
     }  # fmt: skip

@@ -135,7 +135,7 @@ def _constants(code: InlineProgram) -> dict[str, Any]:
         "units": tuple_text((f'"{unit}"' for unit in units), WIDTH - 44),
         **list_texts(program),
         "patterns": "\n".join(_patterns(code)),
-        "tables": "\n".join(_tables(program)),
+        "tables": "\n".join(tables(program)),
     }
 
 
@@ -243,7 +243,8 @@ def _class_body(called: Iterable[str], own: Mapping[str, str], module: str) -> s
     return indented(f"{name} = {own.get(name, f'{module}.{name}')}" for name in sorted(called))
 
 
-def _tables(program: Program) -> list[str]:
+def tables(program: Program) -> list[str]:
+    """Return the tables of splines."""
     lines = []
     for name, spline in program.tables.items():
         lines += [f"{name} = (", "    np.array(("]

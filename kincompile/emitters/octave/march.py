@@ -44,7 +44,9 @@ if TYPE_CHECKING:
 BY_HAND = ("solve_least", "rotate", "make_orthogonal")
 """Functions that are not printed: the language has factorizations of its own."""
 ZEROS = {"real": "0", "int": "0", "bool": "false"}
-NUMBERS = {"INFINITE": "Inf", "TURN": "2 * pi"}
+NUMBERS = {"INFINITE": "Inf", "NOTHING": "NaN", "TURN": "2 * pi"}
+HOLDERS = ("Start", "Transmission")
+"""Structs whose fields the tables of a mechanism are."""
 PLACES = ("PATTERN", "COVER")
 """Tables of places, which count from 1 here."""
 RESULT = "answer"
@@ -123,7 +125,7 @@ class OctaveSolver(OneLane):
 
     def plain(self, node: Statement) -> Lines:
         """Return the lines of a statement."""
-        if isinstance(node, For) and (found := entries_of(node, self.one_by_one)):
+        if isinstance(node, For) and (found := self.at_once_of(node)):
             self.entries = found
             lines = [line for x in node.body for line in self.at_once(x, found)]
             self.entries = None
@@ -154,6 +156,10 @@ class OctaveSolver(OneLane):
             case Break():
                 return ["break"]
         return super().statement(node)
+
+    def at_once_of(self, node: For) -> Entries | None:
+        """Return the entries of a loop that is written without one; None of another."""
+        return entries_of(node, self.one_by_one)
 
     def at_once(self, node: Statement, entries: Entries) -> Lines:
         """Return the lines of a statement for all entries."""
@@ -310,8 +316,9 @@ class OctaveSolver(OneLane):
     def named(self, name: str) -> str:
         """Return the name of a number that the function names first, or of a table."""
         if name in TABLES and self.own is not None:
-            return f"{next(x.name for x in self.own.parameters if x.type.base == 'Start')}.{name}"
-        if name == "INFINITE":
+            holders = (x.name for x in self.own.parameters if x.type.base in HOLDERS)
+            return f"{next(holders)}.{name}"
+        if name in ("INFINITE", "NOTHING"):
             return NUMBERS[name]
         self.used[name] = self.values[name]
         return name

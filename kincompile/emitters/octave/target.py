@@ -87,7 +87,7 @@ evaluators = quantities.singles
 
 def function(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
     """Return the lines of a function; refuse names longer than MATLAB reads."""
-    _require_short(listing.names.values())
+    require_short(listing.names.values())
     rows, columns = (*code.program.shape_of(quantities.quantity_named(name)), 1)[:2]
     lines = WRITE.inputs(code.program, listing)
     values = WRITE.frames(listing, printer) + WRITE.steps(listing, printer)
@@ -108,11 +108,11 @@ def files(
         found[f"{program.name}_{name}"] = _function_file(name, code, "\n".join(lines))
     for name, spline in program.tables.items():
         found[f"{program.name}_{name}"] = _spline(f"{program.name}_{name}", spline)
-    _require_short(found)
+    require_short(found)
     return {f"{name}.m": text for name, text in found.items()}
 
 
-def _require_short(names: Iterable[str]) -> None:
+def require_short(names: Iterable[str]) -> None:
     """Refuse a name that MATLAB would take for another."""
     long = [name for name in names if len(name) > LONGEST_NAME]
     if long:
@@ -137,12 +137,12 @@ def _function_file(name: str, code: InlineProgram, body: str) -> str:
         "fingerprint": program.fingerprint,
         "defaults": _column(((item.name, item.default) for item in program.parameters), 2),
         "body": body,
-        "functions": _called_in(body),
+        "functions": called_in(body),
     }
     return fill("octave/function.m.jinja", data).rstrip("\n") + "\n"
 
 
-def _called_in(body: str) -> str:
+def called_in(body: str) -> str:
     """Return the functions of the templates that a body calls."""
     own = ("either", "in_reals")
     return "".join(fill(f"octave/{name}.m.jinja", {}) for name in own if f"{name}(" in body)
@@ -253,7 +253,7 @@ def _assembly(code: InlineProgram) -> str:
         "tables": "\n".join(_tables(code)),
         "blocks": blocks,
         "determinants": "\n".join(determinants),
-        "functions": _called_in("\n".join(determinants)),
+        "functions": called_in("\n".join(determinants)),
         "solver": OctaveSolver(start(), {**sizes, **STATUSES, **NUMBERS}).text(),
         "CONVERGED": STATUSES["CONVERGED"],
         **_criteria(("CONSTANT", "MAX_ITERATIONS", "SMALL_PART", "TOLERANCE")),

@@ -109,3 +109,21 @@ def test_that_a_compiled_module_runs_without_kincompile(process, pendulum, tmp_p
     # The bob at (1, 0), angle 0.5: the pin is off by (1 - cos 0.5, -sin 0.5), the motor holds.
     expected = [1 - np.cos(0.5), -np.sin(0.5), 0]
     np.testing.assert_allclose([float(part) for part in done.stdout.split()], expected, atol=1e-15)
+
+
+def test_that_a_transmission_is_written_as_a_file_of_its_own(kincompile, pendulum, tmp_path):
+    system = kc.read_model(pendulum).system()
+    ends = f"{system.constraints[-1].name}:{system.coordinates[0].name}"
+    (tmp_path / "out").mkdir()
+    given = ("--transmission", ends, "--target", "c", "-o", tmp_path / "out")
+    done = kincompile("compile", pendulum, *given)
+    assert (done.exit_code, done.stdout) == (0, "")
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == ["pendulum_transmission.c", "pendulum_transmission.h"]
+
+
+@pytest.mark.parametrize("ends", ["motor", "motor:", ":x", "a:b:c", "a,,b:c"])
+def test_that_a_transmission_without_two_ends_is_refused(kincompile, pendulum, ends):
+    done = kincompile("compile", pendulum, "--transmission", ends, "-o", "-")
+    assert done.exit_code != 0
+    assert f"--transmission {ends} is not of the form INPUTS:OUTPUTS" in done.stderr

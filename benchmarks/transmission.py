@@ -1,0 +1,199 @@
+"""Loops as functions: emitted C beside plain C by hand, 20,000 points along a smooth path.
+
+`python -m benchmarks.transmission` prints the time of x, J and J^T tau of a point, and the ratio to
+the peer, in one run: a crank-rocker and a delta in closed form, an ankle by Newton's method.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy
+
+import kincompile as kc
+from benchmarks import machine
+from benchmarks.tables import Target, print_table, print_targets
+from benchmarks.timing import in_turn
+from kincompile import spatial
+from kincompile.spatial import outputs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+PEERS = Path(__file__).with_name("peers") / "transmissions.c"
+POINTS, ROUNDS = 20_000, 40
+LIMIT, ONE_CALL = 1.0, 1.5
+FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")
+
+# Follows a path from the position of the model, or by hand; returns how many points failed.
+FOLLOW = """
+int follow_{name}(long count, const double *u, const double *tau, double *x, double *J, double *e)
+{{
+    {name}_state s;
+    int failed = {name}_start(&s) != 0;
+    for (long k = 0; k < count; k++) {{
+        failed += {name}_transmission(&s, u + {n} * k, x + {m} * k, J + {mn} * k) != 0;
+        {name}_effort(J + {mn} * k, tau, e + {n} * k);
+    }}
+    return failed;
+}}
+
+int by_hand_{name}(long count, const double *u, const double *tau, double *x, double *J, double *e)
+{{
+    for (long k = 0; k < count; k++) {{
+        peer_{name}(u + {n} * k, x + {m} * k, J + {mn} * k);
+        for (int j = 0; j < {n}; j++) {{
+            double sum = 0;
+            for (int i = 0; i < {m}; i++)
+                sum += J[{mn} * k + {n} * i + j] * tau[i];
+            e[{n} * k + j] = sum;
+        }}
+    }}
+    return 0;
+}}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A mechanism, its inputs and outputs, and a path (N, n)."""
+
+    model: Any
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    path: Any
+
+
+def main() -> None:
+    """Measure and print."""
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        print("skipped: there is no C compiler")
+        return
+    before, rows, targets = machine.load(), [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, case in cases().items():
+            ours, theirs = calls_of(name, case, compiler, Path(folder))
+            found = in_turn({"ours": ours, "theirs": theirs}, calls=1, rounds=ROUNDS)
+            times = [1e9 / POINTS * found[x].least for x in ("ours", "theirs")]
+            ratio = times[0] / times[1]
+            rows.append([name, *(f"{x:.0f}" for x in times), f"{ratio:.2f}"])
+            targets.append(Target(f"{name}: along a path, x plain C", ratio, "at most", LIMIT))
+            targets.append(Target(f"{name}: one call, x plain C", ratio, "at most", ONE_CALL))
+    print_table("x, J and J^T tau, ns a point", ("loop", "emitted C", "by hand", "ratio"), rows)
+    print_targets("Loops as functions: what was to be reached", targets)
+    print(f"{machine.description()}. Load before {before}, after {machine.load()}.")
+
+
+def calls_of(
+    name: str, case: Case, compiler: str, folder: Path
+) -> tuple[Callable[[], object], Callable[[], object]]:
+    """Return what follows a path by emitted code and by hand, which agree."""
+    emitted = kc.emit(case.model, "c", transmission=(case.inputs, case.outputs))
+    emitted.write(folder)
+    n, m = case.path.shape[1], len(case.outputs)
+    head = (
+        f'#include "{name}_transmission.h"\nvoid peer_{name}(const double *, double *, double *);\n'
+    )
+    text = head + FOLLOW.format(name=name, n=n, m=m, mn=m * n)
+    (folder / f"{name}_follow.c").write_text(text, encoding="utf-8")
+    sources = [str(folder / f"{name}_follow.c"), str(folder / f"{name}_transmission.c"), str(PEERS)]
+    library = folder / f"{name}.so"
+    command = [
+        compiler,
+        "-std=gnu99",
+        *FLAGS,
+        "-shared",
+        "-fPIC",
+        *sources,
+        "-o",
+        str(library),
+        "-lm",
+    ]
+    subprocess.run(command, check=True)
+    loaded = ctypes.CDLL(str(library))
+    tau = np.linspace(1.0, 2.0, m)
+    found, calls = [], []
+    for kind in ("follow", "by_hand"):
+        room = [np.empty((POINTS, size)) for size in (m, m * n, n)]
+        given = [ctypes.c_void_p(a.ctypes.data) for a in (case.path, tau, *room)]
+        calls.append(partial(getattr(loaded, f"{kind}_{name}"), POINTS, *given))
+        found.append((room, calls[-1]()))
+    (ours, failed), (theirs, _) = found
+    assert failed == 0, f"{failed} points of {name} failed"
+    for here, there in zip(ours[1:], theirs[1:], strict=True):
+        np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.abs(there).max())
+    kept.append((case, tau, found))
+    return calls[0], calls[1]
+
+
+kept: list[object] = []
+"""Arrays that are written to as long as the calls are made."""
+
+
+def cases() -> dict[str, Case]:
+    """Return the mechanisms, by the names of their peers."""
+    turn = np.linspace(0, 2 * np.pi, POINTS, endpoint=False)
+    crank = 1.5 + turn[:, np.newaxis]
+    legs = 0.2251 + 0.02 * np.sin(np.outer(turn, (1, 2)))
+    arms = 0.6 + 0.4 * np.sin(np.outer(turn, (1, 2, 3)) + np.arange(3.0))
+    return {
+        "crank_rocker": Case(crank_rocker(), ("motor",), ("phi_rocker",), crank),
+        "ankle": Case(ankle(), ("left", "right"), ("pitch", "roll"), legs),
+        "delta": Case(delta(), ("t1", "t2", "t3"), ("x", "y", "z"), arms),
+    }
+
+
+def crank_rocker() -> kc.Mechanism:
+    """Return a crank-rocker whose crank turns fully."""
+    m = kc.Mechanism("crank_rocker")
+    crank, rocker = m.body("crank", (0, 0, 1.5)), m.body("rocker", (0.13, 0, 1.74))
+    coupler = m.body("coupler", (0, 0.04, 0.33))
+    m.add(kc.Revolute("O", m.ground, (0, 0), crank, (0, 0)))
+    m.add(kc.Revolute("B", crank, (0.04, 0), coupler, (0, 0)))
+    m.add(kc.Revolute("C", coupler, (0.12, 0), rocker, (0.08, 0)))
+    m.add(kc.Revolute("D", m.ground, (0.13, 0), rocker, (0, 0)))
+    m.add(kc.AbsoluteAngle("motor", crank, 1.5))
+    return m
+
+
+def ankle() -> spatial.Mechanism:
+    """Return an ankle on two linear actuators, behind the shank."""
+    m = spatial.Mechanism("ankle")
+    foot = m.body("foot", (0, 0, 0))
+    m.add(spatial.Universal("cross", m.ground, (0, 0, 0), (0, 1, 0), foot, (0, 0, 0), (1, 0, 0)))
+    for name, side in (("left", 1), ("right", -1)):
+        ends = (-0.045, side * 0.036, 0.24), (-0.052, side * 0.034, 0.015)
+        m.add(spatial.Distance(name, m.ground, ends[0], foot, ends[1], 0.2251))
+    x, y = foot.direction((1, 0, 0)), foot.direction((0, 1, 0))
+    m.output("pitch", outputs.angle((1, 0, 0), x, about=(0, 1, 0)), "rad")
+    m.output("roll", outputs.angle((0, 1, 0), y, about=x), "rad")
+    return m
+
+
+def delta() -> kc.ConstraintSystem:
+    """Return a delta by the equations of its three rods: the platform does not turn."""
+    base, arm, rod, top = 0.2, 0.25, 0.5, 0.05
+    x, y, z = place = sympy.symbols("x y z")
+    motors = sympy.symbols("t1:4")
+    equations = []
+    for k, motor in enumerate(motors):
+        turn = 2 * sympy.pi * k / 3
+        out = base - top + arm * sympy.cos(motor)
+        elbow = (out * sympy.cos(turn), out * sympy.sin(turn), -arm * sympy.sin(motor))
+        equations.append(sum((a - b) ** 2 for a, b in zip(place, elbow, strict=True)) - rod**2)
+    return kc.ConstraintSystem(
+        "delta", (x, y, z, *motors), equations, guess=(0, 0, -0.5, 0.6, 0.6, 0.6)
+    )
+
+
+if __name__ == "__main__":
+    main()

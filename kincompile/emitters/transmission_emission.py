@@ -1,0 +1,56 @@
+"""A transmission as the files of a target."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile.emitters.evaluators import schedule
+from kincompile.emitters.naming import NameTable
+from kincompile.emitters.printer import Printer
+from kincompile.emitters.registry import TARGETS, load_target, load_transmission
+from kincompile.emitters.target import Emitted
+from kincompile.emitters.transmission import NUMBERS, Transmission
+from kincompile.errors import UnsupportedError
+from kincompile.names import listed
+from kincompile.solver.vocabulary import STATUSES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from kincompile.ir.transmission import TransmissionCode
+
+OWN = ("N", "K", "U", "X", "BLOCKS", "ONE", "ANGULAR", "IS_ANGLE", "NOTHING", *NUMBERS, *STATUSES)
+"""Constants of the text, which no variable may be called."""
+
+WITH_TABLES = ("numpy", "c")
+"""Targets whose transmissions have splines."""
+
+
+def require_transmission(target: str) -> None:
+    """Refuse a target that has none."""
+    if not TARGETS[target].has_transmission:
+        known = [name for name, item in TARGETS.items() if item.has_transmission]
+        raise UnsupportedError(
+            f"the target {target!r} has no transmission; targets that do: {listed(known)}"
+        )
+
+
+def emit_transmission(
+    target: str, code: TransmissionCode, q: Sequence[float], u: Sequence[float]
+) -> Emitted:
+    """Return the files of a transmission, which begins at a position and its inputs."""
+    language = load_transmission(target)
+    program = code.code.program
+    if program.tables and target not in WITH_TABLES:
+        raise UnsupportedError(
+            f"{program.name!r} has a spline, which a transmission in {target!r} cannot have; "
+            f"use one of the targets {listed(WITH_TABLES)}"
+        )
+    reserved = (*load_target(target).RESERVED, *language.RESERVED, *OWN, program.name)
+    table = NameTable((*reserved, *program.tables))
+    names = {"t": "t", **{name: table.take(name) for name in code.read}}
+    listing = schedule(code.code, ("outputs",), names, table)
+    printer = Printer(load_target(target).DIALECT, code.code.nodes, listing.names, program.name)
+    return Emitted(
+        program.name, language.files(Transmission(code, listing, printer, tuple(q), tuple(u)))
+    )
