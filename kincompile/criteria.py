@@ -110,6 +110,14 @@ AGREEMENT = 1e-6
 RANK = 1e-9
 """Singular value of Phi_q in scales, relative to the largest, that is zero."""
 
+# Differences
+
+FIRST_DIFFERENCE, SECOND_DIFFERENCE = 1e-5, 1e-4
+"""Parts of a line or a span over which differences give first and second derivatives."""
+
+COMPLEX_STEP = 1e-30
+"""Of a derivative: no difference is taken, and its square is lost in every number."""
+
 # Zero
 
 TINY = 1e-300
@@ -151,6 +159,34 @@ not looked at closely is not trusted."""
 FOLDED = 1e-9
 """Determinant of a block at the guess, beside that at the assembled position, up to which the guess
 shows no branch: bodies without a guess lie on one line."""
+
+LOST = 1e-3
+"""Singular value of Phi_q in scales, relative to the largest, that explains why a motion ended: it
+falls as the square root of the time that is left."""
+
+SAFE_PIVOT, KEPT_PIVOT = 1e-3, 0.1
+"""Size of a plain number, relative to the largest of its row, from which on it is a pivot, and of a
+pivot, relative to the largest of its column, from which on it stays where it is."""
+
+SAME_DETERMINANT = 0.5
+"""Part of a determinant down to which Phi_q counts as no nearer to singular."""
+
+LARGEST_POWER = 600.0
+"""Power of e beyond which no determinant is given: floating point ends at 709."""
+
+# Near singular, in a simulation
+
+ACROSS, ACROSS_LATER, ACROSS_LEFT = 0.1, 0.7, 1e-5
+"""Movement, in scales, to a singular configuration from which a step across it is tried; part of
+its time after which that is tried again; movement from which the motion ends where none was."""
+
+ORDINARY = 0.5
+"""Part of the time to a singular configuration up to which an ordinary step may be long."""
+
+FORESEEN, NEARLY, SHORT, IMAGINARY = 0.8, 1e-4, 0.99, 0.3
+"""Part of the way to it from which its time is foreseen once more; part of a step from which one
+look more gives that time; part of the way that is gone for it: at it there is nothing to see.
+Imaginary part of a time, relative to its real part, up to which it may yet become real."""
 
 # On the branch. Errors of a prediction are in radians and sizes of the mechanism
 
@@ -200,12 +236,9 @@ grow there as one over the root of the time that is left, so that this is q_dot 
 most `LEFT` smallest steps. They have grown `GROWN` times since the time before, and the time to be
 reached lies beyond the lock-up by more than the part `BEFORE_LOCK_UP` of the way to it."""
 
-GROWTH = 1.5
-"""By what a step is longer than the one before it, that was good."""
-
-BEFORE, SHORTER = 0.75, 8.0
-"""Part of the way to where velocities end, as they grow, that a step goes there, and by what a step
-is shorter at most than the one before it."""
+GROWTH, SHORTER, BEFORE = 1.5, 8.0, 0.75
+"""Factor by which a step is longer than a good one before it, and shorter at most; part of the way
+to the end of growing velocities up to which it goes."""
 
 MAX_SUBSTEPS = 10_000
 """Sub-steps between two times after which the march is given up, about a second."""
@@ -215,6 +248,28 @@ PATIENCE = 8
 
 OTHER_SIZE = 100.0
 """How many times smaller or larger an equation must have become to be measured again."""
+
+CLOSE, SOON, SLOW = 0.1, 0.1, 0.1
+"""Part of the largest sensitivity above which a step that fails is one towards a singularity; of
+the time of a movement in which velocities that grow end it soon; and of its largest speed down to
+which one coordinate shows how fast all are."""
+
+# Points of a grid together
+
+TARGET_ERROR, LARGEST_ERROR = 0.0006, 0.0015
+"""Error of the coarse march's prediction aimed at, in radians or sizes of the mechanism, and above
+which a step is not trusted. It falls with the third power of the step, the interpolation's with the
+sixth: the first leaves the points of the grid about 1e-6 from their place."""
+
+LEAST_STRIDE, LARGEST_STRIDE = 0.25, 2.0
+"""Least and largest factor between two steps of the coarse march."""
+
+LAST_COARSE_CORRECTION = 1e-5
+"""Correction, in scales, with which a coarse step ends: the square of it, which is what it leaves,
+and what it changes in the rates are below the error of the interpolation."""
+
+LARGEST_DISPLACEMENT = 1e-3
+"""Distance from the interpolation, in radians or sizes of the mechanism, that is still trusted."""
 
 # Newton's method from a guess
 
@@ -244,6 +299,13 @@ SUFFICIENT = 1e-4
 
 SHORTEST_STEP = 2.0**-20
 """A step shortened to this part without a decrease is at a minimum of the residual."""
+
+DAMPING, LESS_DAMPING, MORE_DAMPING = (1e-13, 1e-3, 1e3), 0.1, 8.0
+"""Least, first and largest damping of Levenberg's and Marquardt's steps, in squares of scales, and
+its factors after a step that lowers the residual, and after one that does not."""
+
+STALLED = 0.98
+"""Part of the square of a residual above which a step that lowers it hardly does."""
 
 # Along the curve of solutions in q and t
 
@@ -291,7 +353,6 @@ LATE = 1e-6
 
 IN_RANGE = 1e-6
 """Part of nu that the equations cannot give, below which a singular point is no lock-up."""
-
 
 SPATIAL_COORDINATES = 7
 """Coordinates of a body in space: three of its place, then its Euler parameters."""

@@ -21,7 +21,7 @@ from kincompile.design.demands import deviation, sides
 from kincompile.design.trial import EAGERNESS
 from kincompile.errors import KincompileWarning
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.engine.planned import Planned
+from kincompile.runtime.engine.linear import Planned
 from kincompile.runtime.march import March, all_hold
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.observed import observed

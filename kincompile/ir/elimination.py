@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import NOISE, SLIGHT, probe_of, rounded, size_of, turning
+from kincompile.criteria import NOISE, SAFE_PIVOT, SLIGHT, probe_of, rounded, size_of, turning
 from kincompile.ir.graph import Constant, Graph, Node
 from kincompile.ir.inline import input_name
 from kincompile.ir.interpret import apply, evaluator
@@ -382,7 +382,7 @@ def _cheapest(graph: Graph, matrix: Matrix, sizes: Sizes, any_pivot: bool) -> Pi
     best: tuple[bool, int, int, int] | None = None
     for row, entries in matrix.items():
         own = {column: sizes.of(graph, row, column, node) for column, node in entries.items()}
-        least = SAFE * max(own.values(), default=0.0)
+        least = SAFE_PIVOT * max(own.values(), default=0.0)
         for column, node in entries.items():
             value = sizes.value(graph, row, column, node)
             is_safe = (own[column] if math.isnan(value) else abs(value)) >= least
@@ -488,10 +488,6 @@ def _eliminate_block(
     substitute(graph, pivots, eliminated, sides, solution)
     substitute(graph, pivots, rows, given, probed)
     return determinants, Look.at(graph, whole, shown, probed, weights)
-
-
-SAFE = 1e-3
-"""Size of a plain number, relative to the largest of its row, from which on it is a pivot."""
 
 
 def _adjugate(graph: Graph, a: list[list[int]]) -> tuple[list[list[int]], int]:

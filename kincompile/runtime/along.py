@@ -12,9 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import BEYOND, LARGE_ERROR, MAX_CORRECTIONS
-from kincompile.runtime.engine.dense import Dense
-from kincompile.runtime.engine.planned import Planned
+from kincompile.criteria import (
+    BEYOND,
+    FIRST_DIFFERENCE,
+    LARGE_ERROR,
+    MAX_CORRECTIONS,
+    SECOND_DIFFERENCE,
+)
+from kincompile.runtime.engine.linear import Dense, Planned
 from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.lanes import Lanes, take_on
 from kincompile.runtime.march import March, State
@@ -31,10 +36,6 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-FIRST, SECOND = 1e-5, 1e-4
-"""Parts of a line over which differences give first and second derivatives, for predictions alone:
-what is found holds as Newton's method makes it hold."""
-
 
 def along(code: Compiled, p: Array, t: float) -> Compiled:
     """Return the equations at one time on lines from parameters p: the way along is their time."""
@@ -47,14 +48,15 @@ def along(code: Compiled, p: Array, t: float) -> Compiled:
         return (code.evaluate or code.position)(q, t, parameters(part, to))
 
     def nu(q: Array, part: float, to: Array) -> Array:
-        before, after = (position(q, part + side * FIRST, to)[0] for side in (-1, 1))
-        return np.asarray((before - after) / (2 * FIRST))
+        before, after = (position(q, part + side * FIRST_DIFFERENCE, to)[0] for side in (-1, 1))
+        return np.asarray((before - after) / (2 * FIRST_DIFFERENCE))
 
     def gamma(q: Array, q_dot: Array, part: float, to: Array) -> Array:
         before, here, after = (
-            position(q + side * SECOND * q_dot, part + side * SECOND, to)[0] for side in (-1, 0, 1)
+            position(q + side * SECOND_DIFFERENCE * q_dot, part + side * SECOND_DIFFERENCE, to)[0]
+            for side in (-1, 0, 1)
         )
-        return np.asarray((2 * here - before - after) / SECOND**2)
+        return np.asarray((2 * here - before - after) / SECOND_DIFFERENCE**2)
 
     found = replace(code, position=position, written=position, nu=nu, gamma=gamma, redundant=())
     own, m = code.lanes, len(code.equations)
@@ -65,17 +67,17 @@ def along(code: Compiled, p: Array, t: float) -> Compiled:
         return own.position(f, q, t, parameters(part, to))
 
     def nu_of_lanes(f: Any, q: Sequence[Any], part: Any, to: Array) -> Sequence[Any]:
-        before, after = (lanes(f, q, part + side * FIRST, to)[:m] for side in (-1, 1))
-        return [(x - y) / (2 * FIRST) for x, y in zip(before, after, strict=True)]
+        before, after = (lanes(f, q, part + side * FIRST_DIFFERENCE, to)[:m] for side in (-1, 1))
+        return [(x - y) / (2 * FIRST_DIFFERENCE) for x, y in zip(before, after, strict=True)]
 
     def gamma_of_lanes(f: Any, q: Any, q_dot: Any, part: Any, to: Array) -> Sequence[Any]:
         before, here, after = (
-            lanes(f, [x + side * SECOND * v for x, v in zip(q, q_dot, strict=True)],
-                  part + side * SECOND, to)[:m]
+            lanes(f, [x + side * SECOND_DIFFERENCE * v for x, v in zip(q, q_dot, strict=True)],
+                  part + side * SECOND_DIFFERENCE, to)[:m]
             for side in (-1, 0, 1)
         )  # fmt: skip
         rows = zip(before, here, after, strict=True)
-        return [(2 * y - x - z) / SECOND**2 for x, y, z in rows]
+        return [(2 * y - x - z) / SECOND_DIFFERENCE**2 for x, y, z in rows]
 
     own_lanes = replace(own, position=lanes, nu=nu_of_lanes, gamma=gamma_of_lanes)
     return replace(found, lanes=own_lanes)
@@ -113,7 +115,7 @@ def lead(inputs: Inputs, equations: Problem, begin: Array, p: Array) -> tuple[Ar
     """Do the same for one set (k,): its position, None where it is not reached, and how it ends."""
     code = along(inputs.code, inputs.p, float(inputs.t[0]))
     engine = Sparse(code, p) if code.blocks else Dense(code, p)
-    march = March(equations, engine, inputs.tolerance)
+    march = March(replace(equations, engine=engine), engine, inputs.tolerance)
     state = march.state(engine.evaluate(begin, 0.0))
     if not isinstance(state, State):
         return None, False
@@ -122,5 +124,6 @@ def lead(inputs: Inputs, equations: Problem, begin: Array, p: Array) -> tuple[Ar
         return outcome.position.q, False
     last = outcome.state or state
     beyond = march.correct(last.point.q, last.t + BEYOND, MAX_CORRECTIONS)
-    apart = equations.extent(beyond.point.q - last.point.q)
-    return None, bool(last.t > 0 and beyond.good and apart <= LARGE_ERROR)
+    if last.t <= 0 or beyond.status is not Status.CONVERGED:
+        return None, False
+    return None, bool(equations.extent(beyond.last.q - last.point.q) <= LARGE_ERROR)

@@ -14,7 +14,7 @@ import numpy as np
 from kincompile.criteria import FOLDED, LARGE_ERROR, MAX_CORRECTIONS, SETTLED, TOO_NEAR
 from kincompile.runtime.along import lead, lead_together
 from kincompile.runtime.attempts import other_sides, safeguarded
-from kincompile.runtime.engine.planned import Planned
+from kincompile.runtime.engine.linear import Planned
 from kincompile.runtime.engine.scales import Point
 from kincompile.runtime.follow import Motion, follow
 from kincompile.runtime.march import March, all_hold

@@ -1,6 +1,6 @@
 """The safeguarded attempts to assemble many parameter sets, together: which are in vain.
 
-One set that cannot be assembled takes a hundred of `corrector.safeguarded_step`. Here all sets take
+One set that cannot be assembled takes a hundred of `problem.safeguarded_step`. Here all sets take
 them side by side; one that comes anywhere near to holding its equations is left to
 `start.assemble`. Where the attempt from its guess leads shows on which branch that would end.
 """
@@ -21,7 +21,7 @@ from kincompile.criteria import (
     SUFFICIENT,
     probe_of,
 )
-from kincompile.runtime.engine.planned import Planned, stacked
+from kincompile.runtime.engine.linear import Planned, stacked
 from kincompile.runtime.engine.scales import weights_of
 from kincompile.runtime.start import mirrored, restart_points
 
@@ -144,7 +144,7 @@ def _pattern_of(code: Compiled) -> _Pattern:
 
 
 class _Attempts:
-    """What `corrector.safeguarded_step` reads, of N problems: arrays (n, N) and (m, N)."""
+    """What `problem.safeguarded_step` reads, of N problems: arrays (n, N) and (m, N)."""
 
     def __init__(
         self, equations: Problem, pattern: _Pattern, sets: Array, t: Array, q: Array

@@ -10,7 +10,7 @@ import numpy as np
 
 from kincompile.criteria import OTHER_SIZE, RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
 from kincompile.names import listed
-from kincompile.runtime.engine.dense import LARGEST_CAREFUL, Dense
+from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense
 from kincompile.runtime.engine.scales import Point
 from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, solve_grid

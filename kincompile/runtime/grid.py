@@ -24,11 +24,18 @@ import numpy as np
 
 from kincompile.criteria import (
     KINK_UNSEEN,
+    LARGEST_DISPLACEMENT,
+    LARGEST_ERROR,
+    LARGEST_STRIDE,
+    LAST_COARSE_CORRECTION,
+    LEAST_STRIDE,
     MAX_CORRECTIONS,
+    NOISE,
     SMALLEST_DETERMINANT,
     SMOOTH_UNSEEN,
+    TARGET_ERROR,
 )
-from kincompile.runtime.engine.planned import Planned
+from kincompile.runtime.engine.linear import Planned
 from kincompile.runtime.march import March, largest
 
 if TYPE_CHECKING:
@@ -37,30 +44,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Array
-    from kincompile.runtime.engine.planned import Lanes
+    from kincompile.runtime.engine.linear import Lanes
     from kincompile.runtime.march import State
 
 BLOCK = 45_000
 """Coordinates of points at a time: enough for the cost of a call not to count, few enough for the
 intermediate arrays to stay in the cache."""
 
-LARGEST_DISPLACEMENT = 1e-3
-"""Distance from the interpolation, in radians or sizes of the mechanism, that is still trusted."""
-
 CORRECTIONS_ON_GRID = 2
 """Newton corrections of every point."""
-
-TARGET_ERROR = 0.0006
-"""Error of the coarse march's prediction aimed at, in radians or sizes of the mechanism. It falls
-with the third power of the step, the interpolation's with the sixth: this one leaves the points of
-the grid about 1e-6 from their place."""
-
-LARGEST_ERROR = 0.0015
-"""Error of the prediction above which a coarse step is not trusted."""
-
-LAST_COARSE_CORRECTION = 1e-5
-"""Correction, in scales, with which a coarse step ends: the square of it, which is what it leaves,
-and what it changes in the rates are below the error of the interpolation."""
 
 SMALLEST_STEP_COUNT = 8
 """No coarse step is longer than this part of the grid."""
@@ -147,8 +139,9 @@ def _coarse_march(
             nodes.append(step[0])
         elif stride == 1:
             break
-        ratio = (TARGET_ERROR / max(error, 1e-12)) ** (1 / 3)
-        stride = max(1, min(longest, int((index - node.index) * min(2.0, max(0.25, ratio)))))
+        ratio = (TARGET_ERROR / max(error, NOISE)) ** (1 / 3)
+        ratio = min(LARGEST_STRIDE, max(LEAST_STRIDE, ratio))
+        stride = max(1, min(longest, int((index - node.index) * ratio)))
     return nodes
 
 

@@ -11,7 +11,8 @@ step is halved, and doubled again once it succeeds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from kincompile.criteria import (
     BEFORE,
     BEFORE_LOCK_UP,
     BEYOND,
+    CLOSE,
     GROWN,
     GROWTH,
     KINK,
@@ -33,16 +35,19 @@ from kincompile.criteria import (
     PATIENCE,
     RESIDUAL_FACTOR,
     ROUNDING,
+    SAME_DETERMINANT,
     SHORTER,
     SINGULAR_SENSITIVITY,
     SMALL_ERROR,
     SMALLEST_PART,
     SMOOTH,
+    SOON,
     TINY,
     TOO_NEAR,
 )
-from kincompile.runtime.engine.dense import Dense, unsolvable
+from kincompile.runtime.engine.linear import Dense, unsolvable
 from kincompile.runtime.engine.scales import Point, column, within
+from kincompile.runtime.problem import iterate, plain_step
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -50,19 +55,10 @@ if TYPE_CHECKING:
 
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.engine.linear import Linear
-    from kincompile.runtime.problem import Problem
+    from kincompile.runtime.problem import Attempt, Problem
 
 SIGN_OF_LIFE = 256
 """Sub-steps between two times after which progress is shown."""
-
-CLOSE = 0.1
-"""Part of the largest sensitivity above which a step that fails is one towards a singularity."""
-
-SOON = 0.1
-"""Part of the time of a movement in which velocities that grow end it soon."""
-
-SAME_DETERMINANT = 0.5
-"""Part of a determinant down to which Phi_q counts as no nearer to singular."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,11 +99,11 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Corrected:
-    """What Newton's method made of a prediction."""
+    """What Newton's method made of a batch of predictions."""
 
-    point: Point  # the position. Phi and Phi_q may be those of a position a rounding error away.
-    good: Any  # bool or (N,), bool: where it converged
-    iterations: Any  # int or (N,): how many corrections were applied
+    point: Point  # the positions. Phi and Phi_q may be those of positions a rounding error away.
+    good: Any  # (N,), bool: where it converged
+    iterations: Any  # (N,): how many corrections were applied
 
 
 class March:
@@ -119,37 +115,20 @@ class March:
 
     def __init__(self, equations: Problem, engine: Linear, tolerance: float) -> None:
         self.equations, self.engine = equations, engine
-        self.tolerance = max(tolerance, equations.floor)
+        self._asked, self.tolerance = tolerance, max(tolerance, equations.floor)
         self._residual = max(RESIDUAL_FACTOR * tolerance, ROUNDING)
         # Factors of Phi_q a rounding error away serve the rates; a dense matrix has none to save.
         self._tight = 0.0 if isinstance(engine, Dense) else min(tolerance, LAST_CORRECTION)
+        self._step = partial(plain_step, tight=self._tight) if self._tight else plain_step
 
     @property
     def scales(self) -> tuple[float, float]:
         """The size of the mechanism and the tolerance, for a compiled march."""
         return self.equations.size, self.tolerance
 
-    def correct(self, q: Array, t: float, most: int) -> Corrected:
-        """Run Newton's method from a prediction.
-
-        The last correction may be so small that Phi_q before it serves what comes after it.
-        """
-        equations, engine = self.equations, self.engine
-        rounding, last = ROUNDING * np.abs(q), np.inf
-        for iteration in range(1, most + 1):
-            point = engine.evaluate(q, t)
-            change = engine.solve(point, point.Phi)
-            q = q - change
-            # Near a singular position rounding alone keeps the corrections above any bound.
-            size = ((np.abs(change) - rounding) / equations.reference).max()
-            if size <= self.tolerance or not size <= last / 4:
-                point = replace(point, q=q) if size <= self._tight else engine.evaluate(q, t)
-                done = size <= self.tolerance and equations.holds(point, self._residual)
-                done = done or equations.holds_to_rounding(point)
-                if done or not size < np.inf:
-                    return Corrected(point, bool(done), iteration)
-            last = size
-        return Corrected(engine.evaluate(q, t), False, most)
+    def correct(self, q: Array, t: float, most: int) -> Attempt:
+        """Run Newton's method from a prediction."""
+        return iterate(self.equations, t, q, self._asked, most, self._step)
 
     def correct_together(self, q: Array, t: Any, most: int, reach: float = np.inf) -> Corrected:
         """Run Newton's method on a batch, in place; what has converged stays where it is.
@@ -252,10 +231,13 @@ class March:
     def step(self, state: State, t: float, most: int) -> Outcome:
         """Predict, correct, and accept the point at `t` only when it continues the motion."""
         predicted = self.predict(state, t)
-        found = self.correct(predicted, t, most)
-        point, iterations = found.point, int(found.iterations)
+        attempt = self.correct(predicted, t, most)
+        iterations = len(attempt.corrections)
+        if attempt.status is not Status.CONVERGED:
+            return Outcome(Status.NOT_CONVERGED, iterations, None)
+        point = attempt.last
         error, is_near = self.error(state, point.q, predicted)
-        if not (found.good and is_near):
+        if not is_near:
             return Outcome(Status.NOT_CONVERGED, iterations, None)
         following = self.state(point, state)
         if isinstance(following, Status):

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.corrector import Attempt
     from kincompile.runtime.inputs import Values
+    from kincompile.runtime.problem import Attempt
     from kincompile.runtime.status import Status
 
     Vector = NDArray[np.float64]

@@ -31,11 +31,10 @@ from kincompile.criteria import (
     THROWN,
     TOO_NEAR,
 )
-from kincompile.runtime.corrector import Attempt, iterate, safeguarded_step
-from kincompile.runtime.engine.dense import LARGEST_CAREFUL, Dense
-from kincompile.runtime.engine.planned import Planned, stacked
+from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense, Planned, stacked
 from kincompile.runtime.engine.scales import converges_linearly
 from kincompile.runtime.march import March, Outcome
+from kincompile.runtime.problem import Attempt, iterate, safeguarded_step
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:

@@ -8,11 +8,13 @@ which the others stay independent.
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import HALF
 from kincompile.structure.rank import DEPENDENT
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 TIMES, ITERATIONS = 32, 8
 """Positions along the motion, and steps of Gauss and Newton to each from the line through two."""
 
-NEAR_ENOUGH = 1e-4
+NEAR_ENOUGH = math.sqrt(HALF)
 """Last step to a position, in scales: what it leaves is the square of it."""
 
 BETTER = 4.0

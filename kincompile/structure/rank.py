@@ -21,7 +21,19 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from kincompile.criteria import ASSEMBLED, HALF, NEAR_MISS, SLIGHT, size_of
+from kincompile.criteria import (
+    ALLOWED_PART,
+    ASSEMBLED,
+    DAMPING,
+    HALF,
+    LESS_DAMPING,
+    MORE_DAMPING,
+    NEAR_MISS,
+    RESIDUAL_FACTOR,
+    SLIGHT,
+    STALLED,
+    size_of,
+)
 from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.structure.blocks import SMALL
@@ -48,13 +60,6 @@ DEPENDENT = SLIGHT
 
 ASIDE = (0.1, 0.03, 0.01, 1e-3, 1e-4)
 """How far a state is moved along the tangents of the independent joints, in scales."""
-
-ON_MANIFOLD = 0.25
-"""Part of such a step that assembling the joints may change: else it led to another branch."""
-
-MISSED = 10.0
-"""Where joints cannot be assembled, rows that differ by up to this many times their residual may
-count as independent of the others."""
 
 UNSURE = math.sqrt(DEPENDENT)
 """What stands for `DEPENDENT` where no position is settled: each is wrong by the root of that."""
@@ -213,14 +218,15 @@ class _Analysis:
         """Return where joints almost hold that cannot hold exactly, and what depends on others.
 
         There a row that would repeat others, were the lengths right, differs from them by about as
-        much as the equations are missed. The others can be assembled. Returns states, the best of
-        them and the limit for what depends; None where that is not the case.
+        much as the equations are missed, or up to ten times that. The others can be assembled.
+        Returns states, the best of them and the limit for what depends; None where that is not the
+        case.
         """
         missed = np.max(np.abs(self._weighted(q, self._t, self._joints)[0]), axis=1)
         best = int(np.argmin(missed))
         if len(self._terms) <= q.shape[1] or not missed[best] <= NEAR_MISS:
             return None
-        state, limit = self._state(q, self._t, best), max(DEPENDENT, MISSED * missed[best])
+        state, limit = self._state(q, self._t, best), max(DEPENDENT, RESIDUAL_FACTOR * missed[best])
         kept, dependent = _split(self._scaled(*state)[0], self._joints, limit)
         _, held, _ = self._assemble(kept, q, self._t)
         return (q, state, limit) if dependent and held.any() else None
@@ -241,7 +247,7 @@ class _Analysis:
         steps *= lengths / np.max(np.abs(steps), axis=1, keepdims=True)
         times, start = np.full(len(ASIDE), t[best]), q[best] + steps * self._scale
         moved, held, settled = self._assemble(kept, start, times)
-        near = (np.abs(moved - start) <= ON_MANIFOLD * lengths * self._scale).all(axis=1)
+        near = (np.abs(moved - start) <= ALLOWED_PART * lengths * self._scale).all(axis=1)
         usable = held & settled & near
         states = np.vstack([q[best], moved[usable]]), np.append(t[best], times[usable])
         return self._state(*states, int(np.argmax([_rank(x) for x in self._scaled(*states)])))
@@ -254,7 +260,7 @@ class _Analysis:
         if not held.any():  # the drivers lead where the joints cannot follow
             return set(dependent) & set(self._drivers)
         missed = np.abs(self._evaluate(found[held], self._t[held])[0]) / self._terms
-        on_branch = (missed[:, repeating] <= ASSEMBLED * 10).all(axis=1)
+        on_branch = (missed[:, repeating] <= ASSEMBLED * RESIDUAL_FACTOR).all(axis=1)
         # The median, for drivers may agree at one time; and a state may be on another branch.
         missed = np.median(missed[on_branch] if on_branch.any() else missed, axis=0)
         return {row for row in dependent if not missed[row] <= ASSEMBLED * 10}
@@ -273,14 +279,14 @@ class _Analysis:
         self, rows: list[int], start: Array, t: Array
     ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
         """Find states at which some rows hold; return them, which do so, and which are settled."""
-        q, step = start.copy(), np.full(len(start), np.inf)
-        damping, idle = np.full(len(q), 1e-3), np.zeros(len(q), dtype=int)
+        (least, first, most), q, step = DAMPING, start.copy(), np.full(len(start), np.inf)
+        damping, idle = np.full(len(q), first), np.zeros(len(q), dtype=int)
         Phi, matrices = self._weighted(q, t, rows)
         size = np.sum(Phi * Phi, axis=1)
         for _ in range(ITERATIONS):
             held = np.max(np.abs(Phi), axis=1, initial=0.0) <= ASSEMBLED / 100
             # At a singular position equations hold to 1e-12 while q is still wrong by 1e-6.
-            settled, stuck = held & (step <= HALF), (idle >= PATIENCE) | (damping >= 1e3)
+            settled, stuck = held & (step <= HALF), (idle >= PATIENCE) | (damping >= most)
             if (held | stuck).all() and (settled.any() or not held.any()):
                 break
             active = np.flatnonzero(~settled & ~stuck)
@@ -292,14 +298,14 @@ class _Analysis:
             tried, jacobians = self._weighted(moved, t[active], rows)
             reached = np.sum(tried * tried, axis=1)
             better = reached < size[active]
-            fell = reached < 0.98 * size[active]
+            fell = reached < STALLED * size[active]
             idle[active] = np.where(fell, 0, idle[active] + better)
             taken = active[better]
             q[taken], Phi[taken], matrices[taken] = moved[better], tried[better], jacobians[better]
             size[taken] = reached[better]
             step[active] = np.max(np.abs(steps), axis=1)
-            factors = np.where(better, 0.1, 8.0)
-            damping[active] = np.clip(damping[active] * factors, 1e-13, 1e3)
+            factors = np.where(better, LESS_DAMPING, MORE_DAMPING)
+            damping[active] = np.clip(damping[active] * factors, least, most)
         return q, np.max(np.abs(Phi), axis=1, initial=0.0) <= ASSEMBLED, step <= HALF
 
     def _weighted(self, q: Array, t: Array, rows: list[int]) -> tuple[Array, Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from kincompile.criteria import NEAR_MISS
 from kincompile.names import listed
 from kincompile.structure.remedies import advice
 from kincompile.tables import counted, indented, pose, table
@@ -18,9 +19,8 @@ if TYPE_CHECKING:
 WIDEST_PATTERN = 45
 """Columns of Phi_q up to which the pattern is drawn; beyond, each row names its coordinates."""
 
-MISSED, SMALL = 8, 1e-3
-"""How many equations that are missed, and bodies, are named; those far smaller than the largest are
-not."""
+MISSED = 8
+"""How many equations that are missed, and bodies, are named."""
 
 EXPLAINED = 10
 """How many redundant or conflicting constraints are explained; the rest are listed."""
@@ -213,7 +213,7 @@ def _unassembled(found: Findings) -> str:
     tried = ((abs(value), name) for name, value in values.items() if name not in dependent)
     sizes = sorted(tried, reverse=True)
     missed = [
-        f"{name} by {size:.3g}" for size, name in sizes[:MISSED] if size > SMALL * sizes[0][0]
+        f"{name} by {size:.3g}" for size, name in sizes[:MISSED] if size > NEAR_MISS * sizes[0][0]
     ]
     touched = found.owners_of(_coordinates_of(found, [name for _, name in sizes[:MISSED]]))
     places = listed(_places(found, touched), MISSED)

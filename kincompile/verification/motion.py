@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.criteria import COMPLEX_STEP
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.quantities import TOGETHER, states_of
-from kincompile.verification.oracles import DIFFERENCE, STEP, slope
+from kincompile.verification.oracles import DIFFERENCE, slope
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -144,13 +145,13 @@ def _dense(code: Compiled, name: str, entries: Array) -> Array:
 
 def _complex_slopes(samples: Samples, order: int) -> Array:
     """Return the derivatives of Q by coordinates or rates, (S, n, n); NaN where it has none."""
-    one, found = np.eye(samples.reference.size) * 1j * STEP, []
+    one, found = np.eye(samples.reference.size) * 1j * COMPLEX_STEP, []
     for q, q_dot, t, p in samples.each():
         try:
             rows = [
                 samples.code.Q(q + h * (order == 0), q_dot + h * (order == 1), t, p) for h in one
             ]
-            found.append(np.imag(rows).T / STEP)
+            found.append(np.imag(rows).T / COMPLEX_STEP)
         except (ArithmeticError, TypeError, ValueError):
             found.append(np.full(one.shape, np.nan))
     return np.array(found)

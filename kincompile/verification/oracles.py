@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from kincompile.criteria import COMPLEX_STEP
 
-STEP = 1e-30
-"""Complex step: no difference is taken, so that it may be as small as one likes."""
+Array = NDArray[Any]
 
 SHORT = 1e-5
 """Step of the differences of complex steps. These are exact to rounding, so that it may be small;
@@ -50,10 +49,10 @@ def complex_step(Phi: Function, q: Array, t: float, along: Array, time: float) -
     It is NaN where Phi of complex numbers is not Phi: a compiled module takes the former from
     NumPy.
     """
-    moved = Phi(q + 1j * STEP * along, t + 1j * STEP * time if time else t)
+    moved = Phi(q + 1j * COMPLEX_STEP * along, t + 1j * COMPLEX_STEP * time if time else t)
     here = Phi(q, t)
     is_same = np.abs(np.real(moved) - here) <= SAME * np.maximum(1.0, np.abs(here))
-    return np.where(is_same, np.imag(moved) / STEP, np.nan)
+    return np.where(is_same, np.imag(moved) / COMPLEX_STEP, np.nan)
 
 
 def second_complex_step(Phi: Function, q: Array, t: float, along: Array, time: float) -> Array:

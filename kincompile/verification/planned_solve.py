@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from kincompile.criteria import SINGULAR_SENSITIVITY
 from kincompile.runtime.engine.blocks import BlockSolver
-from kincompile.runtime.engine.planned import Planned, stacked
+from kincompile.runtime.engine.linear import Planned, stacked
 from kincompile.verification.samples import dense
 
 if TYPE_CHECKING:

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from kincompile.errors import InputError
 from kincompile.quantities import OF_EQUATIONS, TOGETHER, functions, states_of
-from kincompile.runtime.corrector import nearest
 from kincompile.runtime.engine.code import read
 from kincompile.runtime.newton import newton
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import nearest, problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from kincompile.model.system import remember_model
 from kincompile.quantities import functions, quantities_of, states_of
 from kincompile.runtime.engine.blocks import BlockSolver
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.engine.planned import Planned
+from kincompile.runtime.engine.linear import Planned
 
 MACHINERY = {"inline": "class _Quantity", "grouped": "class Group"}
 """From here on all modules are alike: shapes, batches and messages."""

@@ -15,9 +15,8 @@ import pytest
 
 import kincompile as kc
 from kincompile.report.templates import read
-from kincompile.runtime.corrector import iterate
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import iterate, problem
 from kincompile.view.page_scripts import solver_script
 from tests.adversary.chains import (
     Placement,

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.runtime.corrector import iterate
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import iterate, problem
 
 EXAMPLES = ("four_bar", "slider_crank", "wrecker_boom", "cam_flat_follower", "problem_3_5_6")
 TIME = 0.3

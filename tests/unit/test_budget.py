@@ -68,6 +68,22 @@ def test_that_a_test_for_the_dimension_is_a_branch_on_space(budget, tmp_path):
     assert budget.branches_on_space(path) == 3
 
 
+def test_that_numbers_by_which_something_is_judged_are_counted(budget, tmp_path):
+    path = tmp_path / "judged.py"
+    path.write_text(
+        "from math import tau\n"
+        "FIRST, SECOND = 1e-5, 3\n"  # one: the other is a count
+        "ENDS = (0.1, 0.2)\n"  # one list
+        "SMALL: float = 2.0**-20\n"
+        "BASIS = array([1.5, 2.5])\n"  # data
+        "UNITS = {'deg': 0.5}\n"
+        "def f(x):\n"
+        "    return x * 0.5 + 2.0 > 1e-9 * tau\n",
+        encoding="utf-8",
+    )
+    assert budget.thresholds(path) == 4
+
+
 def test_that_more_than_the_budget_is_named_and_so_is_a_folder_without_one(budget):
     most = {"code lines": {"model": 10, "view": 5}}
     lines, above = budget.compared({"code lines": {"model": 11, "view": 5, "new": 1}}, most)

@@ -6,13 +6,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import RANK, RESIDUAL_FACTOR, SMALL_CORRECTION, SOLVED, TOLERANCE
+from kincompile.criteria import (
+    COMPLEX_STEP,
+    RANK,
+    RESIDUAL_FACTOR,
+    SMALL_CORRECTION,
+    SOLVED,
+    TOLERANCE,
+)
 from kincompile.errors import InputError
 from kincompile.names import without_loads
 from kincompile.runtime.engine.code import DYNAMICS, SLOPES
-from kincompile.runtime.engine.dense import powers_of_rows
+from kincompile.runtime.engine.linear import powers_of_rows
 from kincompile.runtime.problem import problem
-from kincompile.runtime.statics.balance import STEP
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,7 +116,7 @@ class Equations:
         for own_rows in (slice(n), slice(n, None)):  # forces, and equations
             if not missing[own_rows].max(initial=0.0) <= SOLVED * terms[own_rows].max(initial=0.0):
                 return nothing
-        change = np.imag(own.M(q + 1j * STEP * q_dot, t, p)) / STEP
+        change = np.imag(own.M(q + 1j * COMPLEX_STEP * q_dot, t, p)) / COMPLEX_STEP
         demanded = found[n:] @ self.nu(q, t)[rows]
         power = Q @ q_dot + q_dot @ change @ q_dot / 2 - demanded
         return np.append(found[:n], power)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import IN_RANGE, ROOT_LENGTH, SINGULAR_SENSITIVITY
+from kincompile.criteria import IN_RANGE, LOST, ROOT_LENGTH, SINGULAR_SENSITIVITY
 from kincompile.errors import InputError
 from kincompile.runtime.inputs import mapping_of
 from kincompile.runtime.roots import root
@@ -37,10 +37,6 @@ SENTENCES = {
     LOCK_UP: singular.SENTENCES[LOCK_UP],
 }
 """What is said of them."""
-
-NEAR = 1e-3
-"""Singular value of the scaled Phi_q, relative to its largest, that explains why a motion ended: it
-falls as the square root of the time that is left."""
 
 PARTS = 8
 """Parts of a step at whose ends a value is looked at: what it passes twice within one is missed."""
@@ -118,7 +114,7 @@ class Watch:
         point = self._equations.point(q, t)
         if point is None:
             return None
-        movements, demands = self._lost(point, NEAR)
+        movements, demands = self._lost(point, LOST)
         if not movements.size:
             return None
         demanded = self._equations.demanded(q, t)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import SAME_TIME
+from kincompile.criteria import ACROSS, ACROSS_LATER, ACROSS_LEFT, ORDINARY, SAME_TIME
 from kincompile.runtime.dynamics.happenings import SINGULAR, STOP
 from kincompile.runtime.dynamics.poses import MIDDLE, ahead, foreseen, passage, times_to
 from kincompile.runtime.dynamics.solvers import MOST_STEPS, stepper
@@ -45,17 +45,6 @@ COLUMNS = (
     "q", "q_dot", "q_ddot", "kinetic", "work", "drift", "residual", "status", "steps"
 )  # fmt: skip
 """Arrays with an entry for each point."""
-
-
-NEAR_PART = 0.5
-"""Part of the time to a singular configuration up to which an ordinary step may be long."""
-
-NEAR, NEARER = 0.1, 0.7
-"""Movement, in scales, to a singular configuration from which a step across it is tried, and part
-of its time after which that is tried again."""
-
-LEFT = 1e-5
-"""Movement to a singular configuration that no step led across: the motion ends there."""
 
 
 class Step:
@@ -170,11 +159,11 @@ class Integration:
         before, y, length = solver.t, self._held, solver.length
         coming = ahead(self._times, self._forward)
         step = self._across(before, y, coming) if self._is_near(y, coming, length) else None
-        if step is None and self._movement(y, coming) <= LEFT:
+        if step is None and self._movement(y, coming) <= ACROSS_LEFT:
             self._stop(before, y, DRIFTS)
             return None
         if step is None:
-            solver.step(NEAR_PART * coming)
+            solver.step(ORDINARY * coming)
             if solver.problem or not np.isfinite(solver.y).all():
                 problem = solver.problem or "the rates are not finite"
                 self._stop(before, y, f"{problem}. {FAILS}")
@@ -209,8 +198,8 @@ class Integration:
         """Say whether a step across the singular configuration that comes is to be tried."""
         if coming > self._tried:
             self._tried = math.inf
-        is_near = self._movement(y, coming) <= NEAR or length > NEAR_PART * coming
-        if not (is_near and coming <= NEARER * self._tried):
+        is_near = self._movement(y, coming) <= ACROSS or length > ORDINARY * coming
+        if not (is_near and coming <= ACROSS_LATER * self._tried):
             return False
         self._tried = coming
         return True

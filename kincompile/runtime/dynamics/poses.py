@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import FORESEEN, IMAGINARY, NEARLY, SHORT, SLIGHT
 from kincompile.runtime.singular.events import quintic
 
 if TYPE_CHECKING:
@@ -23,12 +24,6 @@ if TYPE_CHECKING:
 
     States = Callable[[float], Array]
 
-SLIGHT = 1e-6
-"""Movement, in scales, over which the change of Phi_q is taken."""
-
-TURNED = 0.3
-"""Imaginary part of a time, relative to its real part, up to which it may yet become real."""
-
 MIDDLE = 0.4667
 """Part of a step of DOP853 that is farthest from its stages, which are at 0.333 and at 0.6."""
 
@@ -38,15 +33,6 @@ rates are interpolated."""
 
 LOOKS = 8
 """How often the time of a singular configuration is looked at, each look squaring its error."""
-
-FORESEEN = 0.8
-"""Part of the way to a singular configuration from which its time is foreseen once more."""
-
-NEARLY = 1e-4
-"""Time, as a part of a step, from which one look more gives that of a singular configuration."""
-
-SHORT = 0.99
-"""Part of the way to it that is gone to look again: at it there is nothing to be seen."""
 
 
 def times_to(equations: Equations, t: float, y: Array) -> Array:
@@ -70,7 +56,7 @@ def times_to(equations: Equations, t: float, y: Array) -> Array:
     except np.linalg.LinAlgError:  # it is singular here
         return np.zeros(1)
     times = -1 / found[found != 0]
-    return np.asarray(times.real[np.abs(times.imag) <= TURNED * np.abs(times.real)])
+    return np.asarray(times.real[np.abs(times.imag) <= IMAGINARY * np.abs(times.real)])
 
 
 def ahead(times: Array, forward: float) -> float:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.criteria import TINY
 from kincompile.errors import InputError, package_of_extra
 
 if TYPE_CHECKING:
@@ -142,7 +143,7 @@ class _Multistep(Stepper):
 
         rtol, atol = (part * STRICTER / np.sqrt(y.size) for part in tolerance)
         longest = max_step if np.isfinite(max_step) else 0.0
-        finite = np.where(np.isfinite(atol), atol, LARGE)
+        finite = np.where(np.isfinite(atol), atol, 1 / TINY)  # one that never counts
         self.t, self.y, self._end = t[0], y, t[1]
         self.length = first or 0.0
         self._solver = CVODE(
@@ -169,9 +170,6 @@ class _Multistep(Stepper):
 
 MOST_STEPS = 100_000
 """Steps of a method between two of the times that were asked for, after which it is given up."""
-
-LARGE = 1e100
-"""An absolute tolerance that never counts."""
 
 STRICTER = 0.1
 """Part of the tolerance that CVODE gets: Newton's method ends there at a tenth of it, with a matrix

@@ -13,8 +13,8 @@ import numpy as np
 from kincompile.criteria import HALF, RANK
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, rate, suggestion
-from kincompile.runtime.corrector import nearest
 from kincompile.runtime.inputs import mapping_of
+from kincompile.runtime.problem import nearest
 from kincompile.runtime.singular.reach import missed
 from kincompile.runtime.status import Status
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import SOLVED
+from kincompile.criteria import LARGEST_POWER, SOLVED
 from kincompile.runtime.engine.equal_blocks import EqualBlocks
 
 if TYPE_CHECKING:
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 LARGEST_BLOCK, MOST_KINDS, LARGEST_BAND = 40, 100, 200
 """Equations of a block, kinds of blocks, and numbers before it that one of s may need, up to which
 blocks are solved side by side: more take longer than SuperLU does."""
-
-LARGEST_POWER = 600.0
-"""Power of e beyond which no determinant is given: floating point ends at 709."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

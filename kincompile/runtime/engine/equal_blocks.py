@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import KEPT_PIVOT
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
     Index = NDArray[np.intp]
-
-PIVOT = 0.1
-"""Part of the largest entry of its column from which on a pivot stays where it is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,7 +120,7 @@ def _factor(a: Array) -> tuple[Index | None, Array]:
     order, determinants = None, np.ones(a.shape[-1])
     for k in range(len(a)):
         column = np.abs(a[k:, k])
-        moved = np.flatnonzero(column[0] < PIVOT * column.max(axis=0))
+        moved = np.flatnonzero(column[0] < KEPT_PIVOT * column.max(axis=0))
         if moved.size:
             if order is None:
                 order = np.repeat(np.arange(len(a))[:, np.newaxis], a.shape[-1], axis=1)

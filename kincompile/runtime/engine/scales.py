@@ -124,7 +124,12 @@ class Scales:
         Near a singular configuration rounding alone keeps the corrections above any tolerance: they
         crawl.
         """
-        small = self.is_small(point.q - before.q, point.q, tolerance)
+        # Its length alone nearly always says whether a correction is small.
+        length, bound = corrections[-1], max(tolerance, self.floor)
+        most = bound * max(1.0, self.size) * math.sqrt(point.q.size) + ROUNDING * norm(point.q)
+        small = length <= bound * min(1.0, self.size) or (
+            length <= 2 * most and self.is_small(point.q - before.q, point.q, tolerance)
+        )
         if small and self.holds(point, RESIDUAL_FACTOR * tolerance):
             return True
         return (small or converges_linearly(corrections)) and bool(self.holds_to_rounding(point))

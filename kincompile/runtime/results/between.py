@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 
-from kincompile.criteria import MAX_CORRECTIONS, SLIGHT, TOLERANCE
-from kincompile.runtime.engine.planned import Planned
+from kincompile.criteria import FIRST_DIFFERENCE, MAX_CORRECTIONS, SLIGHT, TOLERANCE
+from kincompile.runtime.engine.linear import Planned
 from kincompile.runtime.march import March, State, all_hold
 from kincompile.runtime.problem import problem
 from kincompile.runtime.singular.events import quintic
@@ -29,10 +29,7 @@ T = TypeVar("T")
 Between: TypeAlias = Generator[float, None, T]
 
 SHARP = 1e-2
-"""Part of the largest rate from which on a jump of a rate over twice `APART` is a corner."""
-
-APART = 1e-5
-"""Distance of the times that give a rate where none is emitted, as a part of the span."""
+"""Part of the largest rate from which on a jump over twice `FIRST_DIFFERENCE` is a corner."""
 
 
 class ObservedMotion:
@@ -70,7 +67,7 @@ class ObservedMotion:
         """
         y, y_dot, y_ddot = (yield from self._observed(t))[:, k]
         if not self.emitted[k]:
-            h = APART * self.span
+            h = FIRST_DIFFERENCE * self.span
             at = yield from self.values([t + part * h for part in (-2, -1, 1, 2)], k)
             y_dot = (8 * (at[2] - at[1]) - (at[3] - at[0])) / (12 * h)
         return float(y), float(y_dot), float(y_ddot)
@@ -86,7 +83,7 @@ class ObservedMotion:
         """Say whether an output turns back in a corner, where its rate jumps, at most by `most`."""
         if self.emitted[k]:
             return not abs(rate) <= SLIGHT * most
-        h = APART * self.span
+        h = FIRST_DIFFERENCE * self.span
         before, here, after = yield from self.values([t - h, t, t + h], k)
         bend = before - 2 * here + after
         return not abs(bend) <= SHARP * h * most

@@ -17,7 +17,7 @@ from kincompile.criteria import HALF, RANK, TINY, probe_of
 from kincompile.errors import InputError, SingularConfigurationWarning
 from kincompile.names import listed, multiplier
 from kincompile.runtime.engine.code import FORCES, JOINTS, code_of
-from kincompile.runtime.engine.dense import powers_of_rows
+from kincompile.runtime.engine.linear import powers_of_rows
 from kincompile.runtime.results.columns import largest
 from kincompile.runtime.results.force_measures import ForceMeasures, force_measures
 from kincompile.runtime.results.observed import Points

@@ -305,7 +305,7 @@ def _time_ratio(motion: ObservedMotion, dead: list[float], period: float | None)
     """Return the longer by the shorter time between the two dead points of a period."""
     if period is None:
         return None
-    own = [time for time in dead if time < dead[0] + period - 1e-9 * motion.span]
+    own = [time for time in dead if time < dead[0] + period - ZERO * motion.span]
     if len(own) != 2:
         return None
     one = own[1] - own[0]

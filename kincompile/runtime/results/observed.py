@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import probe_of
-from kincompile.runtime.engine.planned import trusted
+from kincompile.runtime.engine.linear import trusted
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.columns import Observed
 

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import SAME_POSITION, SMALL_CORRECTION
+from kincompile.criteria import SAME_POSITION, SMALL_CORRECTION, STILL
 from kincompile.errors import InputError
 from kincompile.names import listed
-from kincompile.runtime.corrector import iterate, safeguarded_step
 from kincompile.runtime.engine.scales import norm
 from kincompile.runtime.inputs import read_inputs
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import iterate, problem, safeguarded_step
 from kincompile.runtime.start import unwound
 from kincompile.runtime.status import Status
 
@@ -205,7 +204,7 @@ def _periodic(equations: Problem, t: float, guess: Vector) -> NDArray[np.bool_]:
         q[column] += math.tau
         turned = equations.at(q, t)
         periodic[column] = turned is not None and bool(
-            np.allclose(turned.Phi, generic.Phi, rtol=1e-11, atol=1e-11 * norm(generic.Phi))
+            np.allclose(turned.Phi, generic.Phi, rtol=STILL, atol=STILL * norm(generic.Phi))
         )
     return periodic
 

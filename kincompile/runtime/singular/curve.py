@@ -30,7 +30,7 @@ from kincompile.criteria import (
     STRAIGHT,
     TOLERABLE_CORRECTION,
 )
-from kincompile.runtime.engine.dense import solve_linear
+from kincompile.runtime.engine.linear import solve_linear
 from kincompile.runtime.engine.scales import weights_of
 from kincompile.runtime.roots import root
 

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import SAME_POSITION, ZERO
-from kincompile.runtime.corrector import nearest
-from kincompile.runtime.engine.dense import Dense
+from kincompile.runtime.engine.linear import Dense
 from kincompile.runtime.march import State
+from kincompile.runtime.problem import nearest
 from kincompile.runtime.singular.assemblies import MOST_COORDINATES
 from kincompile.runtime.singular.curve import Curve
 from kincompile.runtime.status import Status

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import RANK, TINY, ZERO
-from kincompile.runtime.corrector import nearest
-from kincompile.runtime.problem import problem
+from kincompile.criteria import COMPLEX_STEP, RANK, TINY, ZERO
+from kincompile.runtime.problem import nearest, problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -25,9 +24,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.inputs import Inputs
     from kincompile.runtime.problem import Problem
-
-STEP = 1e-30
-"""Of a complex step; its square is lost in every number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,8 +92,8 @@ class Balance:
     def turning(self, q: Array, factors: Array, t: float, directions: Array) -> Array:
         r"""Return the changes of :math:`\Phi_q^T \lambda - Q` along directions (n, k)."""
         loads = self.slopes(q, t) @ directions
-        moved = np.asarray(self.code.Phi_q(q + 1j * STEP * directions.T, t, self._p))
-        joints = np.einsum("kmn,m->nk", moved.imag, factors) / STEP
+        moved = np.asarray(self.code.Phi_q(q + 1j * COMPLEX_STEP * directions.T, t, self._p))
+        joints = np.einsum("kmn,m->nk", moved.imag, factors) / COMPLEX_STEP
         return np.asarray(joints - loads)
 
     def stiffness(self, place: Place) -> Array:
@@ -129,10 +125,10 @@ class Balance:
 
     def in_time(self, q: Array, factors: Array, t: float) -> tuple[Array, Array]:
         r"""Return how :math:`\Phi_q^T \lambda - Q` and Phi change in time where nothing moves."""
-        later = t + 1j * STEP
+        later = t + 1j * COMPLEX_STEP
         moved = np.asarray(self.code.Phi_q(q, later, self._p))
         load = np.asarray(self.loads(q, later))
-        forces = (moved.imag.T @ factors - load.imag) / STEP
+        forces = (moved.imag.T @ factors - load.imag) / COMPLEX_STEP
         return forces, -np.asarray(self.code.nu(q, t, self._p))
 
     def gradients(self, names: Sequence[str], q: Array, t: float) -> Array:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from kincompile.criteria import SLIGHT
+from kincompile.criteria import NEAR_MISS, SLIGHT
 from kincompile.errors import InputError
 from kincompile.html import Shown
 from kincompile.names import unknown
@@ -16,9 +16,6 @@ from kincompile.runtime.results.forces import Forces
 
 if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array
-
-CLOSED = 1e-3
-"""Part of the largest power by which that at the end may differ from that at the start."""
 
 FEWEST = 8
 """Points of which a cycle has at least."""
@@ -99,7 +96,7 @@ def flywheel(found: Forces, driver: str, fluctuation: float) -> Flywheel:
             f"the driver {driver!r} does not run at a constant speed, for which a flywheel is "
             "sized: give it a driver such as w*kc.t."
         )
-    if abs(power[-1] - power[0]) > CLOSED * np.abs(power).max():
+    if abs(power[-1] - power[0]) > NEAR_MISS * np.abs(power).max():
         raise InputError(
             f"the power of {driver!r} is {power[0]:.6g} at the start and {power[-1]:.6g} at the "
             "end: solve over one whole cycle, so that the motion ends where it began."

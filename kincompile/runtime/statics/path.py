@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import ZERO
-from kincompile.runtime.engine.dense import Dense
+from kincompile.runtime.engine.linear import Dense
 from kincompile.runtime.march import State
 from kincompile.runtime.singular.curve import Curve
 from kincompile.runtime.singular.events import event_of

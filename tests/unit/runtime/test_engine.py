@@ -10,9 +10,7 @@ import sympy
 
 import kincompile as kc
 from kincompile.runtime.engine.code import POINTS, SENSITIVE, code_of
-from kincompile.runtime.engine.dense import Dense
-from kincompile.runtime.engine.linear import Linear
-from kincompile.runtime.engine.planned import Planned
+from kincompile.runtime.engine.linear import Dense, Linear, Planned
 from kincompile.runtime.engine.scales import Point
 from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.load import from_source

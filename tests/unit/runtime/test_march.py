@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.engine.planned import Planned
+from kincompile.runtime.engine.linear import Planned
 from kincompile.runtime.march import March, State
 from kincompile.runtime.problem import problem
 

@@ -268,7 +268,7 @@ def test_that_points_which_are_not_trusted_are_solved_by_matrices(name, example_
     column = solution.coordinates[-1]
     usual, few = (kc.sensitivities(solution, names, of=x) for x in (None, column))
     monkeypatch.setattr(
-        "kincompile.runtime.engine.planned.SMALLEST_DETERMINANT", 2.0
+        "kincompile.runtime.engine.linear.SMALLEST_DETERMINANT", 2.0
     )  # every determinant is smaller than twice the largest
     assert_complex_steps(solution, kc.sensitivities(solution, names))
     matrices = kc.sensitivities(solution, names, of=column)

@@ -8,10 +8,9 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.runtime import corrector, start
+from kincompile.runtime import problem, start
 from kincompile.runtime.engine.code import PLACE, code_of
-from kincompile.runtime.engine.dense import Dense
-from kincompile.runtime.engine.planned import Planned
+from kincompile.runtime.engine.linear import Dense, Planned
 from kincompile.runtime.status import Status
 from tests.unit.design.test_fit import three_cranks
 
@@ -139,7 +138,7 @@ def test_that_sets_that_cannot_be_assembled_are_found_out_together(four_bar, mon
     alone = [kc.newton(four_bar, 0.0, None, {k: x[n] for k, x in sets.items()}) for n in range(48)]
     failed = [result.status != Status.CONVERGED for result in alone]
     steps = []
-    one_step = corrector.safeguarded_step
+    one_step = problem.safeguarded_step
 
     def counted(*arguments):
         steps.append(arguments)

@@ -10,9 +10,8 @@ import sympy
 
 import kincompile as kc
 from kincompile.report.templates import read
-from kincompile.runtime.corrector import iterate
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.problem import problem
+from kincompile.runtime.problem import iterate, problem
 from kincompile.view.page_scripts import MOST_COORDINATES, solver_script
 
 NODE = shutil.which("node") or shutil.which("nodejs")
