@@ -58,7 +58,7 @@ def require_rates(q, q_dot, q_ddot, k, tolerance, **numbers):
 def plan(request, monkeypatch):
     """Let elimination be as it is, or take any plain number for a pivot, rounding errors too."""
     if request.param == "bad":
-        monkeypatch.setattr(elimination, "SAFE", 0.0)
+        monkeypatch.setattr(elimination, "SAFE_PIVOT", 0.0)
         monkeypatch.setattr(elimination, "NOISE", -1.0)
     return request.param
 
@@ -66,7 +66,7 @@ def plan(request, monkeypatch):
 @pytest.mark.usefixtures("quick_compiler")
 def test_that_velocities_are_looked_at_and_accelerations_too(monkeypatch):
     """A bad plan gives wrong velocities, accelerations, or both with opposite signs."""
-    monkeypatch.setattr(elimination, "SAFE", 0.0)
+    monkeypatch.setattr(elimination, "SAFE_PIVOT", 0.0)
     monkeypatch.setattr(elimination, "NOISE", -1.0)
     x, y, u, k, a, b, c = sympy.symbols("x y u k a b c")
     driver = a * kc.t + b * kc.t**2 + c * sympy.exp(-kc.t)
