@@ -26,7 +26,7 @@ from kincompile.names import escaped_lines
 
 COMMANDS = (
     "assemblies", "compare", "compile", "derive", "draw", "equilibrium", "exercise", "fit",
-    "inspect", "mark", "run", "schema", "simulate", "sweep", "tolerance", "view",
+    "inspect", "mark", "run", "schema", "simulate", "sweep", "tolerance", "transmission", "view",
 )  # fmt: skip
 """The commands: each is the `command` of the file of its name."""
 

@@ -1,4 +1,4 @@
-"""The tables `tolerance` and `fit` of a model file: what `kc.tolerance` and `kc.fit` are given.
+"""The tables `tolerance`, `fit` and `transmission` of a model file: what commands are given.
 
 [tolerance]
 of = ["slider.x"]
@@ -12,12 +12,19 @@ targets = [
     { path = "P", points = [[1, 2], [1.5, 2.2]], times = [0.1, 0.2] },
     { limit = "b/a", least = 1.5 },
 ]
+
+[transmission]
+inputs = ["left", "right"]
+outputs = ["pitch", "roll"]
+grid = { left = { from = 0.21, to = 0.24, count = 4 }, right = [0.22, 0.23] }
+efforts = { pitch = 35 }
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import sympy
 
 from kincompile.design import targets
@@ -64,6 +71,29 @@ def read_fit(path: str | os.PathLike[str], model: Mechanism) -> Arguments:
         for k, item in enumerate(found["targets"])
     ]
     return _checked(reader, found)
+
+
+def read_transmission(path: str | os.PathLike[str]) -> Arguments:
+    """Return inputs, outputs, values of inputs and efforts of the table of a model file."""
+    reader, table = _read(path, "transmission")
+    found = dict(vars(table))
+    found["efforts"] = found["efforts"] or {}
+    found["grid"] = {
+        name: _values(reader, item, ("transmission", "grid", name))
+        for name, item in (found["grid"] or {}).items()
+    }
+    return _checked(reader, found)
+
+
+def _values(reader: FieldReader, item: Any, address: Address) -> list[float]:
+    """Return the values of an input."""
+    if not isinstance(item, tasks.Span):
+        return list(item)
+    if item.count is None:
+        reader.problem(address, "give it a count of equally spaced values")
+        return []
+    found: list[float] = np.linspace(item.first, item.last, item.count).tolist()
+    return found
 
 
 def _read(path: str | os.PathLike[str], section: str) -> tuple[FieldReader, Any]:

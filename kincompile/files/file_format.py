@@ -51,10 +51,11 @@ DECLARED: Mapping[str, type] = {
     "parameter": Parameter, "body": Body, "coordinate": Coordinate, "point": BodyPoint,
     "output": Output, "sweep": tasks.Sweep, "span": tasks.Span, "fit": tasks.Fit,
     "tolerance": tasks.Tolerance, "deviation": tasks.Limits,
+    "transmission": tasks.Transmission,
 }  # fmt: skip
 """Tables that are declared classes, by their names in the schema."""
 
-TASKS = ("tolerance", "fit", "sweep")
+TASKS = ("tolerance", "fit", "sweep", "transmission")
 """Tables that commands of these names read; to a model they belong as data."""
 
 FIELDS: dict[str, Mapping[str, Field]] = {
@@ -77,6 +78,7 @@ FIELDS: dict[str, Mapping[str, Field]] = {
         "sweep": _optional(kind.ref("sweep")),
         "tolerance": _optional(kind.ref("tolerance")),
         "fit": _optional(kind.ref("fit")),
+        "transmission": _optional(kind.ref("transmission")),
     },
     **{name: declared_fields(item) for name, item in DECLARED.items()},
     "sketch": {

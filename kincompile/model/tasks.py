@@ -1,4 +1,4 @@
-"""The tables of a model's file that commands read: ``[sweep]``, ``[tolerance]`` and ``[fit]``.
+"""The tables of a model's file that commands read: ``[sweep]``, ``[fit]`` and others.
 
 To a model they belong as data, `Mechanism.tasks`.
 """
@@ -58,6 +58,20 @@ class Sweep:
     )
     measures: tuple[str, ...] = given(
         kind.NAMES, "Measures that are kept, as `foot.x.stroke`.", default=()
+    )
+
+
+@declared
+class Transmission:
+    """What a file says of a mechanism as a function of its inputs."""
+
+    inputs: tuple[str, ...] = given(kind.NAMES, "Drivers and coordinates.")
+    outputs: tuple[str, ...] = given(kind.NAMES, "Coordinates, outputs and points.")
+    grid: Mapping[str, tuple[float, ...] | Span] | None = given(
+        kind.named(_SWEPT), "Values of each input that is not at its first pose.", default=None
+    )
+    efforts: Mapping[str, float] | None = given(
+        kind.named(kind.CONSTANT), "What each output delivers.", default=None
     )
 
 

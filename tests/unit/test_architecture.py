@@ -70,6 +70,7 @@ DEFERRED = {
     "kincompile.cli.motion",
     "kincompile.cli.sweep",
     "kincompile.cli.tolerance",
+    "kincompile.cli.transmission",
     "kincompile.compiler",
     "kincompile.files.dimensions",
     "kincompile.files.file_format",

@@ -96,12 +96,12 @@ def driver_ranges(solution: MotionTable, code: Compiled, p: Array) -> tuple[Driv
         found = []
         for name, unit, row, value, is_squared in code.request(DRIVERS)(t, p):
             form = Measure(unit, value**2 if is_squared else value, is_squared)
-            low, high = (_limit(equations, form, row, q, t, sign) for sign in (-1.0, 1.0))
+            low, high = (limit(equations, form, row, q, t, sign) for sign in (-1.0, 1.0))
             found.append(DriverRange(name, unit, value, low, high))
         return tuple(found)
 
 
-def _limit(equations: Problem, form: Measure, row: int, q: Array, t: float, sign: float) -> Limit:
+def limit(equations: Problem, form: Measure, row: int, q: Array, t: float, sign: float) -> Limit:
     """Follow the driver of a row one way, up to the first singular configuration."""
     reach = ROUND if form.unit == "rad" else SIZES * float(np.max(equations.reference))
     point = equations.at(q, t)

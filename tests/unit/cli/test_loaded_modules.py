@@ -65,6 +65,9 @@ NOT_LOADED = {
         f"{EXTRA} {LARGE} {LANGUAGES} kincompile.derivations kincompile.checker "
         f"kincompile.verification kincompile.view.page ezdxf watchfiles {SPACE}"
     ),
+    "transmission MODEL --inputs motor --outputs bob.phi": (
+        f"{PAGES} {LARGE} {LANGUAGES} rich platformdirs matplotlib"
+    ),
     "view MODEL -o PAGE.html": (
         f"{EXTRA} {LARGE} {SPACE} kincompile.derivations kincompile.checker"
     ),

@@ -1,0 +1,116 @@
+"""`kincompile transmission`, the table of model files, and the example."""
+
+import json
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import kincompile as kc
+from kincompile.cli import cli
+from tests import transmission_models as models
+
+FOLDER = Path(__file__).resolve().parents[3] / "examples" / "transmissions"
+ANKLE = FOLDER / "ankle.toml"
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli, ["transmission", *map(str, arguments)], prog_name="kincompile")
+
+
+@pytest.fixture(scope="module")
+def four_bar(tmp_path_factory):
+    path = tmp_path_factory.mktemp("models") / "four_bar.toml"
+    knee = models.crank_rocker(0.06, 0.30, 0.05, 0.305)
+    path.write_text(knee.to_toml())
+    return path
+
+
+def test_that_the_table_of_a_file_is_tabulated():
+    result = run(ANKLE)
+    assert result.exit_code == 0, result.output
+    lines = result.stdout.splitlines()
+    assert lines[0] == "ankle: (left [m], right [m]) -> (pitch [rad], roll [rad])"
+    assert lines[1] == "6 poses"
+    f = kc.transmission(kc.read_model(ANKLE), ["left", "right"], ["pitch", "roll"])
+    u = np.array([0.24, 0.23])
+    row = np.array([float(text) for text in lines[9].split()])
+    wanted = *u, *f(u), *f.J(u).ravel(), *f.effort(u, [35, 0]), np.linalg.det(f.J(u))
+    np.testing.assert_allclose(row, wanted, rtol=1e-5)
+    assert "lock-up: foot" in lines[-1]
+
+
+def test_that_options_say_what_a_table_does(four_bar):
+    names = "--inputs", "motor", "--outputs", "rocker.phi"
+    result = run(four_bar, *names, "--grid", "motor=0.5:60deg:3", "--effort", "rocker.phi=5")
+    assert result.exit_code == 0, result.output
+    rows = [line.split() for line in result.stdout.splitlines()[4:7]]
+    golden = [0.5, 0.325043226472306, 1.72388737247146, 8.61943686235732]
+    np.testing.assert_allclose([float(x) for x in rows[0][:4]], golden, rtol=1e-5)
+    assert float(rows[2][0]) == pytest.approx(np.pi / 3, rel=1e-5)
+    # The ends of the input are those of the table: positions of type 2.
+    limits = result.stdout.splitlines()[-1].split()
+    assert [float(limits[3]), float(limits[7])] == pytest.approx([0.369863, 2.356], abs=1e-4)
+
+
+def test_that_degrees_are_shown(four_bar):
+    result = run(four_bar, "--inputs", "motor", "--outputs", "rocker.phi", "--deg")
+    assert "motor [deg]" in result.stdout
+    assert float(result.stdout.splitlines()[4].split()[0]) == pytest.approx(np.degrees(1.5), 1e-5)
+
+
+def test_that_poses_that_are_not_reached_end_with_3(four_bar):
+    names = "--inputs", "motor", "--outputs", "rocker.phi"
+    result = run(four_bar, *names, "--grid", "motor=1:2.5:2")
+    assert result.exit_code == 3
+    assert "nan" in result.stdout
+    assert "1 of 2 poses were not reached, the first at motor = 2.5" in result.stderr
+
+
+WRONG = [
+    ((), "has no table [transmission]. Add one; its fields are: inputs, outputs, grid, efforts"),
+    (("--inputs", "moter", "--outputs", "rocker.phi"), "did you mean 'motor'?"),
+    (("--inputs", "motor", "--outputs", "rocker.phi", "--grid", "motor=1:2"), "NAME=FIRST:LAST:CO"),
+    (("--inputs", "motor", "--outputs", "rocker.phi", "--grid", "motor=1:2:0"), "with a count of"),
+    (("--inputs", "motor", "--outputs", "rocker.phi", "--grid", "moter=1:2:3"), "no input or outp"),
+    (("--inputs", "motor", "--outputs", "rocker.phi", "--effort", "psi=3"), "no input or output"),
+    (("--inputs", "motor", "--outputs", "rocker.phi", "--effort", "rocker.phi=x"), "give NAME=VAL"),
+]
+
+
+@pytest.mark.parametrize(("options", "message"), WRONG)
+def test_that_wrong_options_are_named(four_bar, options, message):
+    result = run(four_bar, *options)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+TABLES = [
+    ('inputs = ["left"]', "outputs"),
+    ('inputs = "left"\noutputs = ["roll"]', "expected a list of names in quotes"),
+    (
+        'inputs = ["left"]\noutputs = ["roll"]\ngrid = { left = { from = 1, to = 2 } }',
+        "give it a c",
+    ),
+    ('inputs = ["left"]\noutputs = ["roll"]\nefforts = { roll = "" }', "efforts"),
+]
+
+
+@pytest.mark.parametrize(("table", "message"), TABLES)
+def test_that_wrong_tables_are_named(tmp_path, table, message):
+    path = tmp_path / "ankle.toml"
+    path.write_text(ANKLE.read_text().partition("[transmission]")[0] + f"[transmission]\n{table}\n")
+    result = run(path)
+    assert result.exit_code == 2
+    assert message in result.stderr
+
+
+def test_that_the_example_is_the_same_as_data_and_prints_what_it_says(capsys):
+    model = runpy.run_path(str(FOLDER / "ankle.py"), run_name="__main__")["m"]
+    assert "actuators [0.207166 0.213622] m" in capsys.readouterr().out  # golden, T3-SPU pose 2
+    assert kc.emit(kc.read_model(ANKLE)).source == kc.emit(model).source
+    assert "transmission" in json.dumps(dict(kc.read_model(ANKLE).tasks))
+    assert kc.read_model(ANKLE).to_toml().endswith(ANKLE.read_text().partition("\n\n")[2][-200:])
