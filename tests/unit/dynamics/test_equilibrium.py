@@ -84,7 +84,7 @@ def test_that_the_stiffness_is_the_second_derivative_of_the_potential():
     assert found.stiffness("tip.x")[0] == pytest.approx(expected, rel=1e-12)
     with pytest.raises(kc.InputError, match=r"tip.x, tip.y cannot move independently"):
         found.stiffness("tip.x", "tip.y")
-    with pytest.raises(kc.InputError, match=r"no output 'x_top'; did you mean 'x_tip'"):
+    with pytest.raises(kc.InputError, match=r"has no column 'top.x'; did you mean 'x_tip'"):
         found.stiffness("top.x")
     with pytest.raises(kc.InputError, match="name what is pushed"):
         found.stiffness()
