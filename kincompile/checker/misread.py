@@ -49,9 +49,12 @@ class Misread:
             kind, text = self._reversed(names[k])
             back = replace(states, q=_with(states.q, k, -states.q[:, k]))
             yield from self._read(kind, text, back)
+            column = self.reference.columns.get(names[k])
+            if column is None:
+                continue  # an Euler parameter, where columns are those of a small rotation
             # The same in Phi, before it was differentiated.
             back = replace(back, q_dot=_with(states.q_dot, k, -states.q_dot[:, k]))
-            yield from self._read(kind, text, back, k)
+            yield from self._read(kind, text, back, column)
         if isinstance(self.block.constraint, FreeEquation) and len(own) <= MOST_MISREAD:
             for a, b in permutations(own, 2):
                 text = f"{names[b]} stands where {names[a]} belongs, throughout"
