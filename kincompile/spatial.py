@@ -10,7 +10,7 @@ Everything that is not a body or a joint is called as in the plane.
 """
 
 import kincompile.files.write_model  # noqa: F401 - the text of a file, which models do not import
-from kincompile.runtime.results.orientation import orientation as orientation
+from kincompile.runtime.results.solution import orientation as orientation
 from kincompile.space import outputs as outputs
 from kincompile.space.catalogue import *  # noqa: F403
 from kincompile.space.loads import FollowerForce as FollowerForce

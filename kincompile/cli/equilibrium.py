@@ -11,7 +11,7 @@ import kincompile as kc
 from kincompile.cli import shared
 from kincompile.cli.motion import set_values
 from kincompile.errors import InputError
-from kincompile.runtime.results.summary import without_noise
+from kincompile.runtime.results.write import without_noise
 from kincompile.tables import table
 
 if TYPE_CHECKING:

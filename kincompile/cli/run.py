@@ -13,8 +13,7 @@ from kincompile.cli.motion import Motion, motion_options, sweep_options
 from kincompile.cli.progress import progress_bar
 from kincompile.errors import InputError
 from kincompile.names import listed
-from kincompile.runtime.results.summary import summary
-from kincompile.runtime.results.write import require_known_suffix
+from kincompile.runtime.results.write import require_known_suffix, summary
 
 if TYPE_CHECKING:
     import numpy as np

@@ -9,9 +9,8 @@ from kincompile.cli import shared
 from kincompile.cli.motion import Motion, set_values, time_options
 from kincompile.cli.progress import progress_bar
 from kincompile.errors import InputError
-from kincompile.runtime.dynamics.solvers import METHODS
-from kincompile.runtime.results.summary import summary
-from kincompile.runtime.results.write import require_known_suffix
+from kincompile.runtime.dynamics.integrate import METHODS
+from kincompile.runtime.results.write import require_known_suffix, summary
 
 
 @click.command("simulate")

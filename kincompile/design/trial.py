@@ -19,8 +19,8 @@ from kincompile.errors import KincompileWarning
 from kincompile.runtime.follow import follow
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.results.sensitivities import sensitivities
+from kincompile.runtime.solve import solution_of
 from kincompile.runtime.status import Status
-from kincompile.runtime.verdict import solution_of
 
 if TYPE_CHECKING:
     from types import ModuleType

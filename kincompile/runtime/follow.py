@@ -10,9 +10,8 @@ import numpy as np
 
 from kincompile.criteria import OTHER_SIZE, RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
 from kincompile.names import listed
-from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense
+from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense, Sparse
 from kincompile.runtime.engine.scales import Point
-from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.grid import CORRECTIONS_ON_GRID, solve_grid
 from kincompile.runtime.march import March, Outcome, State
 from kincompile.runtime.problem import problem
@@ -81,6 +80,13 @@ class Motion:
     def arrays(self) -> tuple[NDArray[Any], ...]:
         """All that there is an entry of for each point, and of each motion."""
         return self.states, self.status, self.residual, self.iterations
+
+    def fields(self) -> dict[str, Any]:
+        """Return the fields of a solution that it has."""
+        names = ("q", "q_dot", "q_ddot", "status", "residual", "iterations")
+        arrays = zip(names, (*self.states, *self.arrays[1:]), strict=True)
+        said = {"statistics": self.statistics, "events": self.events}
+        return said | {name: values.T for name, values in arrays}
 
     def of(self, which: Any) -> Motion:
         """Return one of the motions, or some of them; of a number or a slice in the same arrays."""

@@ -71,6 +71,19 @@ class Inputs:
             raise InputError(f"{text}, got {self.t.size}: {remedy}.")
         return float(self.t[0])
 
+    def about(self) -> dict[str, Any]:
+        """Return what a solution says of its mechanism, by field."""
+        code, p = self.code, self.p.tolist() if self.sets is None else self.sets.T
+        return {
+            "name": code.name,
+            "coordinates": code.coordinates,
+            "equations": code.equations,
+            "units": dict(code.units),
+            "parameters": dict(zip(code.parameters, p, strict=True)),
+            "sweep": dict(self.sweep),
+            "module": code.module,
+        }
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Variants:

@@ -38,9 +38,8 @@ from kincompile.criteria import (
     rounded,
     size_of,
 )
-from kincompile.runtime.engine.linear import Dense, unsolvable
+from kincompile.runtime.engine.linear import Dense, Sparse, unsolvable
 from kincompile.runtime.engine.scales import Scales, converges_linearly, norm, weights_of
-from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:

@@ -72,7 +72,7 @@ def times_at(
     low, high = times[place - 1], times[place]
     found = np.interp(forward * wanted, forward * column, times)
     q = known.q[known.good][place - 1]
-    for _ in range(ITERATIONS):  # as `roots.zero`, in arrays: there may be thousands of values
+    for _ in range(ITERATIONS):  # as `curve.zero`, in arrays: there may be thousands of values
         order = np.argsort(found, kind="stable")
         motion = solve(module, found[order], p, q[order[0]], throw=True)
         error, slope = np.empty((2, wanted.size))

@@ -24,7 +24,6 @@ from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.singular.events import ended
 from kincompile.runtime.start import give_up, start
 from kincompile.runtime.status import Status
-from kincompile.runtime.verdict import fields_of
 from kincompile.tables import counted
 
 if TYPE_CHECKING:
@@ -315,4 +314,6 @@ def _solution(inputs: Inputs, motions: Motion) -> Solution:
             f"{name}: {failed.size} of {count} variants failed; the first is variant "
             f"{variant} at t = {inputs.t[index]:.10g} ({status.name}). {why}"
         )
-    return Solution(success=failed.size == 0, message=message, **fields_of(inputs, motions))
+    return Solution(
+        success=failed.size == 0, message=message, t=inputs.t, **motions.fields(), **inputs.about()
+    )

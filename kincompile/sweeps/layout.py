@@ -12,8 +12,7 @@ from kincompile.names import listed, suggestion
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import TIME_UNIT
-from kincompile.runtime.results.force_measures import force_measure
-from kincompile.runtime.results.forces import forces
+from kincompile.runtime.results.forces import force_measure, forces
 from kincompile.runtime.results.measures import measures_together
 
 if TYPE_CHECKING:

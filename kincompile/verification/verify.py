@@ -26,8 +26,8 @@ from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.model.system import model_of
 from kincompile.quantities import OF_EQUATIONS, QUANTITIES
-from kincompile.runtime.contract import check as check_contract
 from kincompile.runtime.engine.code import code_of, require_square
+from kincompile.runtime.load import check as check_contract
 from kincompile.tables import indented, table
 from kincompile.verification.motion import errors_of_motion
 from kincompile.verification.oracles import ORACLES, Oracle

@@ -12,8 +12,8 @@ from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.report.picture import svg_element
 from kincompile.runtime.singular.events import DOUBTS, SENTENCES
+from kincompile.runtime.solve import WORDS
 from kincompile.runtime.status import Status
-from kincompile.runtime.verdict import WORDS
 from kincompile.view.drawing import drawing
 from kincompile.view.picture import picture
 

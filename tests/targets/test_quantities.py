@@ -17,8 +17,7 @@ from kincompile.ir.inline import inline
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.quantities import AT_POSITION, Quantity
-from kincompile.runtime.contract import check
-from kincompile.runtime.load import from_source
+from kincompile.runtime.load import check, from_source
 from kincompile.runtime.native.module import make_native
 
 TOYS = (

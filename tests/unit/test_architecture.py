@@ -251,7 +251,7 @@ def test_imports_go_down_and_do_not_cross_the_wall() -> None:
 def test_a_module_is_read_by_name_at_the_border_alone() -> None:
     """Elsewhere its `Compiled` says what it has."""
     by_name = re.compile(r"\b(?:getattr|hasattr|vars)\([^()]*\bmodule\b|module\.__dict__")
-    border = {"contract", "inputs", "load", "engine.code", "native.module"}
+    border = {"inputs", "load", "engine.code", "native.module"}
     found = {
         name
         for name, source in package_sources().items()

@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from kincompile import quantities
 from kincompile.criteria import SPATIAL_COORDINATES, covers, may_turn, turning
 from kincompile.errors import InputError, StructuralError, UnsupportedError
-from kincompile.names import listed
-from kincompile.quantities import pattern_of
-from kincompile.runtime.column_names import VALUES, column_meant
-from kincompile.runtime.contract import functions, present_in
+from kincompile.names import column_name, listed, rate, rate_of, suggestion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Container, Hashable, Iterable, Mapping, Sequence
     from types import ModuleType
 
-    from kincompile.quantities import Quantity
+    from kincompile.quantities import Part, Quantity
 
 Array = NDArray[np.float64]
 
@@ -246,6 +244,26 @@ TYPED = "position", "nu", "gamma", "Phi_q", "M", "Q", "Q_q", "Q_q_dot", "observe
 """Functions that are attributes: None where a module without loads or outputs has none."""
 
 
+MARKS: Mapping[Part, str] = {
+    "outputs": "OUTPUTS",
+    "loads": "LOADS",
+    "motion": "forward_dynamics",
+}
+"""By which name a module shows that it has the quantities of a part."""
+
+
+def present_in(names: Container[str]) -> tuple[Quantity, ...]:
+    """Return the quantities of a module with these names: of outputs, loads, motion if it can."""
+    return quantities.quantities_of([part for part, mark in MARKS.items() if mark in names])
+
+
+def functions(names: Container[str]) -> tuple[str, ...]:
+    """Return the functions of an emitted module with these names."""
+    present = present_in(names)
+    matrices = (item.name for item in present if item.is_matrix)
+    return (*quantities.functions(present), *(f"{name}_nonzeros" for name in matrices))
+
+
 def code_of(module: ModuleType) -> Compiled:
     """Return a module as it was read, by the loader; read now for any other module."""
     found = vars(module).get(PLACE)
@@ -264,14 +282,14 @@ def attach(module: ModuleType, written: Callable[..., Any] | None = None) -> Com
 def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compiled:
     """Return what a module has, typed; with the `position` that compiled code has replaced."""
     names = vars(module)
-    quantities, lanes = present_in(names), names.get("LANES", {})
+    present, lanes = present_in(names), names.get("LANES", {})
     coordinates, bodies = names["COORDINATES"], names.get("BODIES", ())
     places = [range(first, first + count) for _, first, count in bodies]
     units = [names["UNITS"][name] for name in coordinates]
     given, entries = (names["GUESS"] != 0).tolist(), _entries(names)
     known = {name: names[name] for name in (*functions(names), *MORE) if name in names}
     typed: dict[str, Any] = {name: known.get(name) for name in TYPED}
-    patterns = {item.name: pattern_of(item) for item in quantities if item.is_matrix}
+    patterns = {item.name: quantities.pattern_of(item) for item in present if item.is_matrix}
     observe = lanes.get("observe") if "observe_into" not in names else None
     return Compiled(
         module=module,
@@ -295,7 +313,7 @@ def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compi
         nonzeros=names["Phi_q_nonzeros"],
         written=written or names["position"],
         functions=known,
-        quantities=quantities,
+        quantities=present,
         patterns={name: names[place] for name, place in patterns.items() if place in names},
         has_loads="LOADS" in names,
         **typed,
@@ -392,4 +410,54 @@ def require_square(code: Compiled) -> None:
     raise StructuralError(
         f"{code.name} has {m} equations for {n} coordinates ({listed(code.coordinates)}), "
         f"and the motion needs as many equations as coordinates: {remedy}."
+    )
+
+
+RATES = range(3)
+"""Orders of columns: values, rates and second rates."""
+
+VALUES = range(1)
+"""Orders of columns of which no rate is asked for."""
+
+ADVICE = "add _dot or _ddot for the rates"
+
+
+def column_meant(
+    owner: str,
+    given: object,
+    coordinates: Sequence[str],
+    outputs: Sequence[str] = (),
+    *,
+    orders: Sequence[int] = RATES,
+    advice: str = ADVICE,
+) -> tuple[str, int]:
+    """Return the coordinate or output of which a column is the rate, and the order of the rate.
+
+    Parameters
+    ----------
+    owner
+        Who has the columns, for the message.
+    given
+        The name of the column, as ``"phi_rod_dot"`` or ``"rod.phi_dot"``.
+    coordinates, outputs
+        Names of those that have columns.
+    orders
+        Orders of rates that may be asked for.
+    advice
+        How further columns are had, for the message.
+
+    Raises
+    ------
+    InputError
+        When no column has this name; the message lists those that exist.
+    """
+    names = (*coordinates, *outputs)
+    if found := rate_of(str(given), names, orders):
+        return found
+    every = (rate(name, order) for order in orders for name in names)
+    near = suggestion(column_name(str(given)), every) or "."
+    others = f", the outputs {listed(outputs)}" if outputs else ""
+    raise InputError(
+        f"{owner} has no column {given!r}{near} The coordinates are {listed(coordinates)}{others}; "
+        f"{advice}."
     )

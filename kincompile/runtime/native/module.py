@@ -20,19 +20,17 @@ from kincompile.runtime.engine.code import attach, code_of
 from kincompile.runtime.memory import empty
 from kincompile.runtime.native.library import library
 from kincompile.runtime.native.points import (
-    Places,
-    function_of_positions,
-    function_of_states,
-)
-from kincompile.runtime.native.structures import (
     NUMBER,
     REAL,
     STATES,
     Motion,
     Numbers,
+    Places,
     System,
     Variants,
     batch_type,
+    function_of_positions,
+    function_of_states,
     numbers_of_batch,
     numbers_of_times,
 )

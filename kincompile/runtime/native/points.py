@@ -1,4 +1,4 @@
-"""One point evaluated by compiled code, with as little around the call as can be.
+"""The arguments of compiled code, and one point evaluated with as little around as can be.
 
 What is around the code takes ten times as long as the code itself: arguments are looked at once,
 and nothing is called that need not be.
@@ -7,12 +7,11 @@ and nothing is called that need not be.
 from __future__ import annotations
 
 import ctypes
-from ctypes import addressof, byref, c_double, c_int, c_void_p
+from ctypes import Structure, addressof, byref, c_double, c_int, c_size_t, c_ssize_t, c_void_p
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from kincompile.runtime.native.structures import REAL, Numbers, numbers_of_point
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -20,6 +19,86 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array, Compiled
 
     Function = Callable[..., Any]
+
+REAL = np.dtype(np.float64)
+NUMBER = REAL.itemsize
+
+STATES = ("q", "q_dot", "q_ddot")
+
+
+class Numbers(Structure):
+    """Numbers of many points: entry i of point k is ``first[i * entry + k * point]``."""
+
+    _fields_ = (("first", c_void_p), ("entry", c_ssize_t), ("point", c_ssize_t))
+
+
+@cache
+def batch_type(results: tuple[str, ...]) -> type[Any]:
+    """Return the structure of what is to be evaluated, as the emitted header has it."""
+    fields = (
+        ("count", c_size_t),
+        *((name, Numbers) for name in ("q", "q_dot", "t", "p")),
+        *((name, Numbers) for name in (*(("q_ddot",) if "outputs" in results else ()), *results)),
+        ("varying_only", c_int),
+    )
+    return type("Batch", (Structure,), {"_fields_": fields})
+
+
+class System(Structure):
+    """Linear systems, as the emitted header has them."""
+
+    _fields_ = (("count", c_size_t), *((name, Numbers) for name in ("nonzeros", "b", "x")))
+
+
+class Motion(Structure):
+    """A motion, as the emitted header has it."""
+
+    _fields_ = (
+        ("count", c_size_t),
+        *((name, c_void_p) for name in ("t", "p", "guess")),
+        ("size", c_double),
+        ("tolerance", c_double),
+        ("max_iterations", c_int),
+        *((name, Numbers) for name in ("q", "q_dot", "q_ddot")),
+        *((name, c_void_p) for name in ("residual", "status", "iterations")),
+    )
+
+
+class Variants(Structure):
+    """Motions of many variants, as the emitted header has them."""
+
+    _fields_ = (
+        ("count", c_size_t),
+        ("variants", c_size_t),
+        ("t", c_void_p),
+        ("p", Numbers),
+        ("guess", Numbers),
+        ("size", c_double),
+        ("tolerance", c_double),
+        ("max_iterations", c_int),
+        *((name, Numbers) for name in ("q", "q_dot", "q_ddot")),
+        ("time", c_ssize_t),
+        *((name, c_void_p) for name in ("residual", "status", "iterations")),
+    )
+
+
+def numbers_of_point(array: Array) -> Numbers:
+    """Return the numbers of one point."""
+    return Numbers(array.ctypes.data, 1, 0)
+
+
+def numbers_of_batch(array: Array) -> Numbers:
+    """Return an array whose last axis is the batch; one without it is shared by all points."""
+    if array.ndim == 2:
+        entry, point = array.strides
+        return Numbers(array.ctypes.data, entry // NUMBER, point // NUMBER)
+    return Numbers(array.ctypes.data, 1, 0)
+
+
+def numbers_of_times(array: Array) -> Numbers:
+    """Return one time a point, or one for all."""
+    return Numbers(array.ctypes.data, 0, array.strides[-1] // NUMBER if array.ndim else 0)
+
 
 COPIED: Mapping[int, Function] = {
     1: lambda a: a.copy(),

@@ -10,7 +10,7 @@ import numpy as np
 
 from kincompile.errors import InputError, package_of_extra
 from kincompile.names import rate, rate_of
-from kincompile.runtime.column_names import column_meant
+from kincompile.runtime.engine.code import column_meant
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:

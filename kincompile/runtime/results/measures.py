@@ -27,7 +27,7 @@ from kincompile.runtime.results.between import ObservedMotion, derivative, toget
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.driver_range import DriverRange, driver_ranges, driver_table
 from kincompile.runtime.results.plot import runs
-from kincompile.runtime.roots import zero
+from kincompile.runtime.singular.curve import zero
 from kincompile.tables import table
 
 if TYPE_CHECKING:

@@ -26,8 +26,7 @@ from kincompile.names import (
     quotient_unit,
     unknown,
 )
-from kincompile.runtime.column_names import column_meant
-from kincompile.runtime.engine.code import SENSITIVE, SENSITIVITIES, code_of
+from kincompile.runtime.engine.code import SENSITIVE, SENSITIVITIES, code_of, column_meant
 from kincompile.runtime.engine.linear import powers_of_rows
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import largest, rate_unit

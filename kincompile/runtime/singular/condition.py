@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.runtime.engine.linear import Dense, Planned
-from kincompile.runtime.engine.sparse import Sparse
+from kincompile.runtime.engine.linear import Dense, Planned, Sparse
 from kincompile.runtime.problem import problem
 
 if TYPE_CHECKING:

@@ -15,11 +15,9 @@ from kincompile.runtime.results.forces import forces, no_value
 from kincompile.runtime.results.solution import OfMotion, Solution
 from kincompile.runtime.singular.assemblies import is_new, spread_starts
 from kincompile.runtime.singular.events import involved
-from kincompile.runtime.statics.balance import Balance
+from kincompile.runtime.statics.balance import Balance, settle
 from kincompile.runtime.statics.path import follow
-from kincompile.runtime.statics.settle import settle
 from kincompile.runtime.status import Status
-from kincompile.runtime.verdict import about
 from kincompile.tables import counted
 
 if TYPE_CHECKING:
@@ -32,7 +30,7 @@ if TYPE_CHECKING:
     from kincompile.runtime.inputs import Inputs, Values
     from kincompile.runtime.results.forces import Forces
     from kincompile.runtime.singular.events import Event
-    from kincompile.runtime.statics.settle import Rest
+    from kincompile.runtime.statics.balance import Rest
 
 STARTS, STARTS_A_FREEDOM = 60, 20
 """Starts from which other equilibria are looked for: at least, and for each degree of freedom."""
@@ -381,7 +379,7 @@ def _equilibrium(
         t=inputs.t, q=q, q_dot=rates, q_ddot=rates.copy(), status=status, residual=residual,
         iterations=iterations, success=len(good) == count,
         message=_message(inputs, balance, found, events), statistics={}, events=events,
-        **about(inputs),
+        **inputs.about(),
     )  # fmt: skip
     kinds = tuple(_kind(balance, rest) for rest in good) + ("",) * (count - len(good))
     return Equilibrium(motion, eigenvalues, kinds, tuple(good), balance)

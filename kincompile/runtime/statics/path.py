@@ -19,7 +19,7 @@ from kincompile.runtime.engine.linear import Dense
 from kincompile.runtime.march import State
 from kincompile.runtime.singular.curve import Curve
 from kincompile.runtime.singular.events import event_of
-from kincompile.runtime.statics.settle import settle
+from kincompile.runtime.statics.balance import settle
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array
     from kincompile.runtime.problem import Problem
     from kincompile.runtime.singular.events import Event
-    from kincompile.runtime.statics.balance import Balance, Place
-    from kincompile.runtime.statics.settle import Rest
+    from kincompile.runtime.statics.balance import Balance, Place, Rest
 
 LIMIT_POINT, BIFURCATION = "limit point", "bifurcation"
 """Kinds of critical points."""

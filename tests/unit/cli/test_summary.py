@@ -5,7 +5,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.runtime.results.summary import summary
+from kincompile.runtime.results.write import summary
 from kincompile.tables import counted, indented, table
 
 NAN = float("nan")

@@ -10,9 +10,8 @@ import sympy
 
 import kincompile as kc
 from kincompile.runtime.engine.code import POINTS, SENSITIVE, code_of
-from kincompile.runtime.engine.linear import Dense, Linear, Planned
+from kincompile.runtime.engine.linear import Dense, Linear, Planned, Sparse
 from kincompile.runtime.engine.scales import Point
-from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.load import from_source
 from kincompile.runtime.problem import problem
 

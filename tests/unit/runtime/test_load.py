@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kincompile.errors import ContractError, InputError
-from kincompile.runtime.contract import functions
+from kincompile.runtime.engine.code import functions
 from kincompile.runtime.load import from_source, load
 
 MODULES = Path(__file__).parent / "modules"

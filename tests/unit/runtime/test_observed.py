@@ -9,7 +9,7 @@ import pytest
 
 import kincompile as kc
 from kincompile import outputs
-from kincompile.runtime.results.summary import summary
+from kincompile.runtime.results.write import summary
 
 A, L = 0.06, 0.26
 

@@ -6,7 +6,7 @@ from contextlib import suppress
 
 import pytest
 
-from kincompile.runtime.roots import root, zero
+from kincompile.runtime.singular.curve import root, zero
 
 WIDTH = 1e-13
 

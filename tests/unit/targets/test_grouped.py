@@ -11,9 +11,8 @@ from kincompile import compiler
 from kincompile.ir.grouping import group
 from kincompile.ir.lower import lower
 from kincompile.runtime.engine import blocks
-from kincompile.runtime.engine.blocks import BlockSolver
+from kincompile.runtime.engine.blocks import BlockSolver, EqualBlocks
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.engine.equal_blocks import EqualBlocks
 
 FUNCTIONS = ("Phi", "Phi_q", "nu", "Phi_q_nonzeros")
 
