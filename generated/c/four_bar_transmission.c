@@ -27,6 +27,8 @@ enum {
     ONE = 1,
 };
 
+#define LANES 8 // poses that are evaluated side by side
+
 // By what a position is judged, and which coordinates and inputs are angles.
 #define KINK 8.0
 #define LARGE_ERROR 0.5
@@ -124,10 +126,10 @@ typedef struct {
     double missed[1];  // by what part of their terms equations are missed
 } pose;
 
-// Correction, slopes, outputs and their Jacobian at a pose.
+// Correction, slopes, outputs and their Jacobian at a pose; `far` says that an angle needs `exact`.
 _always_inline int64_t evaluate_at(const four_bar_state *s, pose *b, int exact)
 {
-    (void)s;
+    (void)s, (void)exact;
     int64_t far = 0;
     const double phi_coupler = b->q[0];
     const double phi_rocker = b->q[1];
@@ -173,14 +175,52 @@ _always_inline int64_t evaluate_at(const four_bar_state *s, pose *b, int exact)
     return far;
 }
 
-static void evaluate(const four_bar_state *s, pose *b)
+static inline void evaluate(const four_bar_state *s, pose *b)
 {
     if (evaluate_at(s, b, 0))
         evaluate_at(s, b, 1);
 }
 
+// The same of several poses, side by side, so that a register takes as many as fit.
+static int64_t evaluate_strip(const four_bar_state *s, pose *b, int count)
+{
+    double given[3][LANES], found[8][LANES];
+    int64_t far = 0;
+    for (int lane = 0; lane < count; lane++) {
+        given[0][lane] = b[lane].q[0];
+        given[1][lane] = b[lane].q[1];
+        given[2][lane] = b[lane].u[0];
+    }
+    for (int lane = 0; lane < count; lane++) {
+        pose one;
+        one.q[0] = given[0][lane];
+        one.q[1] = given[1][lane];
+        one.u[0] = given[2][lane];
+        far |= evaluate_at(s, &one, 0);
+        found[0][lane] = one.change[0];
+        found[1][lane] = one.change[1];
+        found[2][lane] = one.slopes[0][0];
+        found[3][lane] = one.slopes[1][0];
+        found[4][lane] = one.x[0];
+        found[5][lane] = one.J[0][0];
+        found[6][lane] = one.determinants[0];
+        found[7][lane] = one.missed[0];
+    }
+    for (int lane = 0; lane < count; lane++) {
+        b[lane].change[0] = found[0][lane];
+        b[lane].change[1] = found[1][lane];
+        b[lane].slopes[0][0] = found[2][lane];
+        b[lane].slopes[1][0] = found[3][lane];
+        b[lane].x[0] = found[4][lane];
+        b[lane].J[0][0] = found[5][lane];
+        b[lane].determinants[0] = found[6][lane];
+        b[lane].missed[0] = found[7][lane];
+    }
+    return far;
+}
+
 // Predict the position for inputs: along the last way to third order, across it to first.
-static void predict(const four_bar_state *s, const double *u, pose *b)
+static inline void predict(const four_bar_state *s, const double *u, pose *b)
 {
     double step[1];
     double across[1];
@@ -205,19 +245,26 @@ static void predict(const four_bar_state *s, const double *u, pose *b)
     }
 }
 
-// Correct a position until corrections are small; return what became of it.
-static int settle(const four_bar_state *s, int most, double farthest, pose *b)
+// Take the correction of a position; return how large it is, in scales.
+static inline double correct(const four_bar_state *s, pose *b)
 {
     const double inverse = 1.0 / s->size;
+    double size = 0.0;
+    for (int i = 0; i < N; i++) {
+        const double change = fabs(b->change[i]) * (ANGULAR[i] ? 1.0 : inverse);
+        size = change <= size ? size : change;
+        b->q[i] -= b->change[i];
+    }
+    return size;
+}
+
+// Correct a position until corrections are small; return what became of it.
+static inline int settle(const four_bar_state *s, int most, double farthest, pose *b)
+{
     double moved = 0.0;
     for (int iteration = 0; iteration < most; iteration++) {
         evaluate(s, b);
-        double size = 0.0;
-        for (int i = 0; i < N; i++) {
-            const double change = fabs(b->change[i]) * (ANGULAR[i] ? 1.0 : inverse);
-            size = change <= size ? size : change;
-            b->q[i] -= b->change[i];
-        }
+        const double size = correct(s, b);
         moved += size;
         if (!isfinite(moved))
             return FOUR_BAR_NOT_FINITE;
@@ -230,7 +277,7 @@ static int settle(const four_bar_state *s, int most, double farthest, pose *b)
 }
 
 // Return the largest slope, in scales of coordinates and inputs.
-static double steepness(const four_bar_state *s, const pose *b)
+static inline double steepness(const four_bar_state *s, const pose *b)
 {
     const double inverse = 1.0 / s->size;
     double most = 0.0;
@@ -245,7 +292,7 @@ static double steepness(const four_bar_state *s, const pose *b)
 }
 
 // Say whether a position is on another branch, which begins on the way from the last one.
-static int bends(const four_bar_state *s, const pose *b)
+static inline int bends(const four_bar_state *s, const pose *b)
 {
     double error = 0.0;
     double kink = 0.0;
@@ -264,10 +311,9 @@ static int bends(const four_bar_state *s, const pose *b)
     return kink > KINK * error + SMOOTH;
 }
 
-// Go to inputs in one step; return what became of it. A prediction that is far away proves
-// nothing, since angles may turn to any assembly. Where the determinant of a block has changed its
-// sign a singular position lies between.
-static int goes(const four_bar_state *s, const double *u, pose *b)
+// Predict the position for inputs; return whether it is near enough to be corrected. A prediction
+// that is far away proves nothing, since angles may turn to any assembly.
+static inline int sets_out(const four_bar_state *s, const double *u, pose *b)
 {
     predict(s, u, b);
     const double inverse = 1.0 / s->size;
@@ -278,24 +324,36 @@ static int goes(const four_bar_state *s, const double *u, pose *b)
     }
     if (!isfinite(moved))
         return FOUR_BAR_NOT_FINITE;
-    if (moved > LARGE_ERROR)
-        return FOUR_BAR_NOT_CONVERGED;
-    int status = settle(s, MAX_CORRECTIONS, SMALL_ERROR, b);
-    if (status == FOUR_BAR_CONVERGED) {
-        for (int i = 0; i < BLOCKS; i++) {
-            // not so where either is not a number
-            if (!(s->determinants[i] * b->determinants[i] > 0.0))
-                status = FOUR_BAR_SINGULAR;
-        }
-        const double steep = steepness(s, b);
-        if (!(steep <= STEEPEST) || (steep > NEARLY_SINGULAR && bends(s, b)))
+    return moved > LARGE_ERROR ? FOUR_BAR_NOT_CONVERGED : FOUR_BAR_CONVERGED;
+}
+
+// Say whether a position is on the branch of the last one. Where the determinant of a block has
+// changed its sign a singular position lies between.
+static inline int arrives(const four_bar_state *s, const pose *b)
+{
+    int status = FOUR_BAR_CONVERGED;
+    for (int i = 0; i < BLOCKS; i++) {
+        // not so where either is not a number
+        if (!(s->determinants[i] * b->determinants[i] > 0.0))
             status = FOUR_BAR_SINGULAR;
     }
+    const double steep = steepness(s, b);
+    if (!(steep <= STEEPEST) || (steep > NEARLY_SINGULAR && bends(s, b)))
+        status = FOUR_BAR_SINGULAR;
     return status;
 }
 
+// Go to inputs in one step; return what became of it.
+static inline int goes(const four_bar_state *s, const double *u, pose *b)
+{
+    int status = sets_out(s, u, b);
+    if (status == FOUR_BAR_CONVERGED)
+        status = settle(s, MAX_CORRECTIONS, SMALL_ERROR, b);
+    return status == FOUR_BAR_CONVERGED ? arrives(s, b) : status;
+}
+
 // Take a position as the last one, with the way to it unless it is the same.
-static void accept(four_bar_state *s, const pose *b)
+static inline void accept(four_bar_state *s, const pose *b)
 {
     int moves = 0;
     double way[1];
@@ -360,7 +418,7 @@ static int follow(four_bar_state *s, const double *u, pose *b)
 }
 
 // Return what became of a position; one that was not found has no numbers.
-static int ends(int status, pose *b)
+static inline int ends(int status, pose *b)
 {
     if (status != FOUR_BAR_CONVERGED) {
         for (int i = 0; i < X; i++) {
@@ -373,7 +431,7 @@ static int ends(int status, pose *b)
 }
 
 // Find the position for inputs, on the way from the last one; return what became of it.
-static int transmit(four_bar_state *s, const double *u, pose *b)
+static inline int transmit(four_bar_state *s, const double *u, pose *b)
 {
     if (goes(s, u, b) == FOUR_BAR_CONVERGED) {
         accept(s, b);
@@ -451,4 +509,60 @@ void four_bar_effort(const double *J, const double *tau_x, double *tau_u)
         for (int i = 0; i < X; i++)
             tau_u[j] += J[i * U + j] * tau_x[i];
     }
+}
+
+// Goes on to neighbours that are all predicted from the last position, with two corrections at the
+// most. Returns how many were reached, of which the last one is accepted.
+static int strides(four_bar_state *s, const double *u, int count, pose *b)
+{
+    int good = 0;
+    while (good < count && sets_out(s, u + good * U, &b[good]) == FOUR_BAR_CONVERGED)
+        good++;
+    for (int rest = 2; rest > 0; rest--) {
+        int near = 0;
+        if (evaluate_strip(s, b, good))
+            return 0;
+        for (int lane = 0; lane < good; lane++)
+            if (correct(s, &b[lane]) <= LAST_CORRECTION && near == lane)
+                near++;
+        if (near == good || rest == 1) {
+            good = near;
+            break;
+        }
+    }
+    for (int lane = 0; lane < good; lane++)
+        if (!(b[lane].missed[0] <= SOLVED) || arrives(s, &b[lane]) != FOUR_BAR_CONVERGED)
+            good = lane;
+    if (good > 0)
+        accept(s, &b[good - 1]);
+    return good;
+}
+
+size_t four_bar_transmission_batch(four_bar_state *s, size_t count, const double *u, const double *tau_x,
+    double *x, double *J, double *tau_u, int *status)
+{
+    pose b[LANES];
+    size_t found = 0, alone = 0; // points before this one are too far apart to go side by side
+    for (size_t k = 0; k < count;) {
+        const int most = count - k < LANES ? (int)(count - k) : LANES;
+        int became = FOUR_BAR_CONVERGED, done = k < alone ? 0 : strides(s, u + k * U, most, b);
+        found += done;
+        if (done == 0) {
+            alone = k < alone ? alone : k + LANES;
+            became = transmit(s, u + k * U, b);
+            found += became == FOUR_BAR_CONVERGED;
+            done = 1;
+        }
+        for (int lane = 0; lane < done; lane++, k++) {
+            if (x)
+                memcpy(x + k * X, b[lane].x, sizeof b->x);
+            if (J)
+                memcpy(J + k * X * U, b[lane].J, sizeof b->J);
+            if (tau_u)
+                four_bar_effort(b[lane].J[0], tau_x + k * X, tau_u + k * U);
+            if (status)
+                status[k] = became;
+        }
+    }
+    return found;
 }

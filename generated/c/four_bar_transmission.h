@@ -9,6 +9,8 @@
 #ifndef FOUR_BAR_TRANSMISSION_H
 #define FOUR_BAR_TRANSMISSION_H
 
+#include <stddef.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -52,6 +54,12 @@ int four_bar_transmission(four_bar_state *s, const double *u, double *x, double 
 
 // What the inputs supply, tau_u = J^T tau_x, where the outputs deliver tau_x.
 void four_bar_effort(const double *J, const double *tau_x, double *tau_u);
+
+// The same for a path of points: of each k the inputs u + 1 k, and so on; each goes on from the last.
+// Side by side where neighbours are near, so a path costs less than its points one by one. tau_x
+// and tau_u, x, J and status, what became of each point, may be NULL. Returns how many were found.
+size_t four_bar_transmission_batch(four_bar_state *s, size_t count, const double *u,
+    const double *tau_x, double *x, double *J, double *tau_u, int *status);
 
 #ifdef __cplusplus
 }

@@ -158,18 +158,24 @@ const four_bar_transmission = (() => {
         }
     }
 
+    // Take the correction of a position; return how large it is, in scales.
+    function correct(s, b) {
+        const inverse = 1.0 / s.size;
+        let size = 0.0;
+        for (let i = 0; i < N; i += 1) {
+            const change = Math.abs(b.change[i]) * (ANGULAR[i] ? 1.0 : inverse);
+            size = change <= size ? size : change;
+            b.q[i] -= b.change[i];
+        }
+        return size;
+    }
+
     // Correct a position until corrections are small; return what became of it.
     function settle(s, most, farthest, b) {
-        const inverse = 1.0 / s.size;
         let moved = 0.0;
         for (let iteration = 0; iteration < most; iteration += 1) {
             evaluate_at(s, b);
-            let size = 0.0;
-            for (let i = 0; i < N; i += 1) {
-                const change = Math.abs(b.change[i]) * (ANGULAR[i] ? 1.0 : inverse);
-                size = change <= size ? size : change;
-                b.q[i] -= b.change[i];
-            }
+            const size = correct(s, b);
             moved += size;
             if (!Number.isFinite(moved)) {
                 return NOT_FINITE;
@@ -217,10 +223,9 @@ const four_bar_transmission = (() => {
         return kink > KINK * error + SMOOTH;
     }
 
-    // Go to inputs in one step; return what became of it. A prediction that is far away proves
-    // nothing, since angles may turn to any assembly. Where the determinant of a block has changed its
-    // sign a singular position lies between.
-    function goes(s, u, b) {
+    // Predict the position for inputs; return whether it is near enough to be corrected. A prediction
+    // that is far away proves nothing, since angles may turn to any assembly.
+    function sets_out(s, u, b) {
         predict(s, u, b);
         const inverse = 1.0 / s.size;
         let moved = 0.0;
@@ -231,23 +236,33 @@ const four_bar_transmission = (() => {
         if (!Number.isFinite(moved)) {
             return NOT_FINITE;
         }
-        if (moved > LARGE_ERROR) {
-            return NOT_CONVERGED;
-        }
-        let status = settle(s, MAX_CORRECTIONS, SMALL_ERROR, b);
-        if (status === CONVERGED) {
-            for (let i = 0; i < BLOCKS; i += 1) {
-                // not so where either is not a number
-                if (!(s.determinants[i] * b.determinants[i] > 0.0)) {
-                    status = SINGULAR;
-                }
-            }
-            const steep = steepness(s, b);
-            if (!(steep <= STEEPEST) || (steep > NEARLY_SINGULAR && bends(s, b))) {
+        return moved > LARGE_ERROR ? NOT_CONVERGED : CONVERGED;
+    }
+
+    // Say whether a position is on the branch of the last one. Where the determinant of a block has
+    // changed its sign a singular position lies between.
+    function arrives(s, b) {
+        let status = CONVERGED;
+        for (let i = 0; i < BLOCKS; i += 1) {
+            // not so where either is not a number
+            if (!(s.determinants[i] * b.determinants[i] > 0.0)) {
                 status = SINGULAR;
             }
         }
+        const steep = steepness(s, b);
+        if (!(steep <= STEEPEST) || (steep > NEARLY_SINGULAR && bends(s, b))) {
+            status = SINGULAR;
+        }
         return status;
+    }
+
+    // Go to inputs in one step; return what became of it.
+    function goes(s, u, b) {
+        let status = sets_out(s, u, b);
+        if (status === CONVERGED) {
+            status = settle(s, MAX_CORRECTIONS, SMALL_ERROR, b);
+        }
+        return status === CONVERGED ? arrives(s, b) : status;
     }
 
     const way_of_accept = new Float64Array(U);

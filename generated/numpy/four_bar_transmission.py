@@ -241,17 +241,23 @@ def _predict(s, u, b):
         b.q[i] = place
 
 
+def _correct(s, b):
+    """Take the correction of a position; return how large it is, in scales."""
+    inverse = _ratio(1.0, s.size)
+    size = 0.0
+    for i in range(_N):
+        change = abs(b.change[i]) * (1.0 if _ANGULAR[i] else inverse)
+        size = size if change <= size else change
+        b.q[i] -= b.change[i]
+    return size
+
+
 def _settle(s, most, farthest, b):
     """Correct a position until corrections are small; return what became of it."""
-    inverse = _ratio(1.0, s.size)
     moved = 0.0
     for iteration in range(most):
         _evaluate(s, b)
-        size = 0.0
-        for i in range(_N):
-            change = abs(b.change[i]) * (1.0 if _ANGULAR[i] else inverse)
-            size = size if change <= size else change
-            b.q[i] -= b.change[i]
+        size = _correct(s, b)
         moved += size
         if not math.isfinite(moved):
             return _NOT_FINITE
@@ -291,11 +297,10 @@ def _bends(s, b):
     return kink > _KINK * error + _SMOOTH
 
 
-def _goes(s, u, b):
-    """Go to inputs in one step; return what became of it.
+def _sets_out(s, u, b):
+    """Predict the position for inputs; return whether it is near enough to be corrected.
 
-    A prediction that is far away proves nothing, since angles may turn to any assembly. Where the
-    determinant of a block has changed its sign a singular position lies between.
+    A prediction that is far away proves nothing, since angles may turn to any assembly.
     """
     _predict(s, u, b)
     inverse = _ratio(1.0, s.size)
@@ -305,18 +310,31 @@ def _goes(s, u, b):
         moved = moved if way <= moved else way
     if not math.isfinite(moved):
         return _NOT_FINITE
-    if moved > _LARGE_ERROR:
-        return _NOT_CONVERGED
-    status = _settle(s, _MAX_CORRECTIONS, _SMALL_ERROR, b)
-    if status == _CONVERGED:
-        for i in range(_BLOCKS):
-            # not so where either is not a number
-            if not (s.determinants[i] * b.determinants[i] > 0.0):
-                status = _SINGULAR
-        steep = _steepness(s, b)
-        if not (steep <= _STEEPEST) or (steep > _NEARLY_SINGULAR and _bends(s, b)):
+    return _NOT_CONVERGED if moved > _LARGE_ERROR else _CONVERGED
+
+
+def _arrives(s, b):
+    """Say whether a position is on the branch of the last one.
+
+    Where the determinant of a block has changed its sign a singular position lies between.
+    """
+    status = _CONVERGED
+    for i in range(_BLOCKS):
+        # not so where either is not a number
+        if not (s.determinants[i] * b.determinants[i] > 0.0):
             status = _SINGULAR
+    steep = _steepness(s, b)
+    if not (steep <= _STEEPEST) or (steep > _NEARLY_SINGULAR and _bends(s, b)):
+        status = _SINGULAR
     return status
+
+
+def _goes(s, u, b):
+    """Go to inputs in one step; return what became of it."""
+    status = _sets_out(s, u, b)
+    if status == _CONVERGED:
+        status = _settle(s, _MAX_CORRECTIONS, _SMALL_ERROR, b)
+    return _arrives(s, b) if status == _CONVERGED else status
 
 
 def _accept(s, b):

@@ -136,27 +136,34 @@ for i = 1:N
 end
 end
 
+function [b, answer] = correct(s, b)
+% Take the correction of a position; return how large it is, in scales.
+N = 2;
+inverse = 1.0 / s.size;
+size = 0.0;
+for i = 1:N
+    if s.ANGULAR(i)
+        chosen = 1.0;
+    else
+        chosen = inverse;
+    end
+    change = abs(b.change(i)) * chosen;
+    if ~(change <= size)
+        size = change;
+    end
+    b.q(i) = b.q(i) - b.change(i);
+end
+answer = size;
+end
+
 function [b, answer] = settle(s, most, farthest, b)
 % Correct a position until corrections are small; return what became of it.
-N = 2; NOT_FINITE = 3; NOT_CONVERGED = 1; LAST_CORRECTION = 1e-11; CONVERGED = 0;
-SINGULAR = 2; SOLVED = 1e-10;
-inverse = 1.0 / s.size;
+NOT_FINITE = 3; NOT_CONVERGED = 1; LAST_CORRECTION = 1e-11; CONVERGED = 0; SINGULAR = 2;
+SOLVED = 1e-10;
 moved = 0.0;
 for iteration = 1:most
     b = evaluate(s, b);
-    size = 0.0;
-    for i = 1:N
-        if s.ANGULAR(i)
-            chosen = 1.0;
-        else
-            chosen = inverse;
-        end
-        change = abs(b.change(i)) * chosen;
-        if ~(change <= size)
-            size = change;
-        end
-        b.q(i) = b.q(i) - b.change(i);
-    end
+    [b, size] = correct(s, b);
     moved = moved + size;
     if ~isfinite(moved)
         answer = NOT_FINITE;
@@ -228,12 +235,10 @@ end
 answer = kink > KINK * error + SMOOTH;
 end
 
-function [b, answer] = goes(s, u, b)
-% Go to inputs in one step; return what became of it. A prediction that is far away proves
-% nothing, since angles may turn to any assembly. Where the determinant of a block has changed its
-% sign a singular position lies between.
-N = 2; NOT_FINITE = 3; LARGE_ERROR = 0.5; NOT_CONVERGED = 1; MAX_CORRECTIONS = 6;
-SMALL_ERROR = 0.05; CONVERGED = 0; SINGULAR = 2; STEEPEST = 10000.0; NEARLY_SINGULAR = 30.0;
+function [b, answer] = sets_out(s, u, b)
+% Predict the position for inputs; return whether it is near enough to be corrected. A prediction
+% that is far away proves nothing, since angles may turn to any assembly.
+N = 2; NOT_FINITE = 3; NOT_CONVERGED = 1; CONVERGED = 0; LARGE_ERROR = 0.5;
 b = predict(s, u, b);
 inverse = 1.0 / s.size;
 moved = 0.0;
@@ -254,20 +259,39 @@ if ~isfinite(moved)
 end
 if moved > LARGE_ERROR
     answer = NOT_CONVERGED;
-    return
+else
+    answer = CONVERGED;
 end
-[b, status] = settle(s, MAX_CORRECTIONS, SMALL_ERROR, b);
-if status == CONVERGED
-    % not so where either is not a number
-    if any(~(s.determinants .* b.determinants > 0.0))
-        status = SINGULAR;
-    end
-    steep = steepness(s, b);
-    if ~(steep <= STEEPEST) || (steep > NEARLY_SINGULAR && bends(s, b))
-        status = SINGULAR;
-    end
+end
+
+function answer = arrives(s, b)
+% Say whether a position is on the branch of the last one. Where the determinant of a block has
+% changed its sign a singular position lies between.
+CONVERGED = 0; SINGULAR = 2; STEEPEST = 10000.0; NEARLY_SINGULAR = 30.0;
+status = CONVERGED;
+% not so where either is not a number
+if any(~(s.determinants .* b.determinants > 0.0))
+    status = SINGULAR;
+end
+steep = steepness(s, b);
+if ~(steep <= STEEPEST) || (steep > NEARLY_SINGULAR && bends(s, b))
+    status = SINGULAR;
 end
 answer = status;
+end
+
+function [b, answer] = goes(s, u, b)
+% Go to inputs in one step; return what became of it.
+CONVERGED = 0; MAX_CORRECTIONS = 6; SMALL_ERROR = 0.05;
+[b, status] = sets_out(s, u, b);
+if status == CONVERGED
+    [b, status] = settle(s, MAX_CORRECTIONS, SMALL_ERROR, b);
+end
+if status == CONVERGED
+    answer = arrives(s, b);
+else
+    answer = status;
+end
 end
 
 function s = accept(s, b)

@@ -230,18 +230,24 @@ fn predict(s: &Transmission, u: [f64; U], b: &mut Pose) {
     }
 }
 
+/// Take the correction of a position; return how large it is, in scales.
+fn correct(s: &Transmission, b: &mut Pose) -> f64 {
+    let inverse = 1.0 / s.size;
+    let mut size: f64 = 0.0;
+    for i in 0..N_COORDINATES {
+        let change = b.change[i].abs() * (if ANGULAR[i] { 1.0 } else { inverse });
+        size = if change <= size { size } else { change };
+        b.q[i] -= b.change[i];
+    }
+    return size;
+}
+
 /// Correct a position until corrections are small; return what became of it.
 fn settle(s: &Transmission, most: usize, farthest: f64, b: &mut Pose) -> usize {
-    let inverse = 1.0 / s.size;
     let mut moved: f64 = 0.0;
     for iteration in 0..most {
         evaluate(s, b);
-        let mut size: f64 = 0.0;
-        for i in 0..N_COORDINATES {
-            let change = b.change[i].abs() * (if ANGULAR[i] { 1.0 } else { inverse });
-            size = if change <= size { size } else { change };
-            b.q[i] -= b.change[i];
-        }
+        let size = correct(s, b);
         moved += size;
         if !moved.is_finite() {
             return NOT_FINITE;
@@ -289,10 +295,9 @@ fn bends(s: &Transmission, b: &Pose) -> bool {
     return kink > KINK * error + SMOOTH;
 }
 
-/// Go to inputs in one step; return what became of it. A prediction that is far away proves
-/// nothing, since angles may turn to any assembly. Where the determinant of a block has changed its
-/// sign a singular position lies between.
-fn goes(s: &Transmission, u: [f64; U], b: &mut Pose) -> usize {
+/// Predict the position for inputs; return whether it is near enough to be corrected. A prediction
+/// that is far away proves nothing, since angles may turn to any assembly.
+fn sets_out(s: &Transmission, u: [f64; U], b: &mut Pose) -> usize {
     predict(s, u, b);
     let inverse = 1.0 / s.size;
     let mut moved: f64 = 0.0;
@@ -303,23 +308,33 @@ fn goes(s: &Transmission, u: [f64; U], b: &mut Pose) -> usize {
     if !moved.is_finite() {
         return NOT_FINITE;
     }
-    if moved > LARGE_ERROR {
-        return NOT_CONVERGED;
-    }
-    let mut status = settle(s, MAX_CORRECTIONS, SMALL_ERROR, b);
-    if status == CONVERGED {
-        for i in 0..BLOCKS {
-            // not so where either is not a number
-            if !(s.determinants[i] * b.determinants[i] > 0.0) {
-                status = SINGULAR;
-            }
-        }
-        let steep = steepness(s, b);
-        if !(steep <= STEEPEST) || (steep > NEARLY_SINGULAR && bends(s, b)) {
+    return if moved > LARGE_ERROR { NOT_CONVERGED } else { CONVERGED };
+}
+
+/// Say whether a position is on the branch of the last one. Where the determinant of a block has
+/// changed its sign a singular position lies between.
+fn arrives(s: &Transmission, b: &Pose) -> usize {
+    let mut status = CONVERGED;
+    for i in 0..BLOCKS {
+        // not so where either is not a number
+        if !(s.determinants[i] * b.determinants[i] > 0.0) {
             status = SINGULAR;
         }
     }
+    let steep = steepness(s, b);
+    if !(steep <= STEEPEST) || (steep > NEARLY_SINGULAR && bends(s, b)) {
+        status = SINGULAR;
+    }
     return status;
+}
+
+/// Go to inputs in one step; return what became of it.
+fn goes(s: &Transmission, u: [f64; U], b: &mut Pose) -> usize {
+    let mut status = sets_out(s, u, b);
+    if status == CONVERGED {
+        status = settle(s, MAX_CORRECTIONS, SMALL_ERROR, b);
+    }
+    return if status == CONVERGED { arrives(s, b) } else { status };
 }
 
 /// Take a position as the last one, with the way to it unless it is the same.

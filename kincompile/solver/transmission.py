@@ -62,17 +62,23 @@ def predict(s: Transmission, u: Row[U], b: Pose):
         b.q[i] = place
 
 
+def correct(s: Transmission, b: Pose) -> Real:
+    """Take the correction of a position; return how large it is, in scales."""
+    inverse = 1.0 / s.size
+    size: Real = 0.0
+    for i in range(N):
+        change = abs(b.change[i]) * (1.0 if ANGULAR[i] else inverse)
+        size = size if change <= size else change
+        b.q[i] -= b.change[i]
+    return size
+
+
 def settle(s: Transmission, most: Int, farthest: Real, b: Pose) -> Int:
     """Correct a position until corrections are small; return what became of it."""
-    inverse = 1.0 / s.size
     moved: Real = 0.0
     for iteration in range(most):
         evaluate(s, b)
-        size: Real = 0.0
-        for i in range(N):
-            change = abs(b.change[i]) * (1.0 if ANGULAR[i] else inverse)
-            size = size if change <= size else change
-            b.q[i] -= b.change[i]
+        size = correct(s, b)
         moved += size
         if not finite(moved):
             return NOT_FINITE
@@ -112,11 +118,10 @@ def bends(s: Transmission, b: Pose) -> Bool:
     return kink > KINK * error + SMOOTH
 
 
-def goes(s: Transmission, u: Row[U], b: Pose) -> Int:
-    """Go to inputs in one step; return what became of it.
+def sets_out(s: Transmission, u: Row[U], b: Pose) -> Int:
+    """Predict the position for inputs; return whether it is near enough to be corrected.
 
-    A prediction that is far away proves nothing, since angles may turn to any assembly. Where the
-    determinant of a block has changed its sign a singular position lies between.
+    A prediction that is far away proves nothing, since angles may turn to any assembly.
     """
     predict(s, u, b)
     inverse = 1.0 / s.size
@@ -126,18 +131,31 @@ def goes(s: Transmission, u: Row[U], b: Pose) -> Int:
         moved = moved if way <= moved else way
     if not finite(moved):
         return NOT_FINITE
-    if moved > LARGE_ERROR:
-        return NOT_CONVERGED
-    status: Int = settle(s, MAX_CORRECTIONS, SMALL_ERROR, b)
-    if status == CONVERGED:
-        for i in range(BLOCKS):
-            # not so where either is not a number
-            if not s.determinants[i] * b.determinants[i] > 0.0:
-                status = SINGULAR
-        steep = steepness(s, b)
-        if not steep <= STEEPEST or (steep > NEARLY_SINGULAR and bends(s, b)):
+    return NOT_CONVERGED if moved > LARGE_ERROR else CONVERGED
+
+
+def arrives(s: Transmission, b: Pose) -> Int:
+    """Say whether a position is on the branch of the last one.
+
+    Where the determinant of a block has changed its sign a singular position lies between.
+    """
+    status: Int = CONVERGED
+    for i in range(BLOCKS):
+        # not so where either is not a number
+        if not s.determinants[i] * b.determinants[i] > 0.0:
             status = SINGULAR
+    steep = steepness(s, b)
+    if not steep <= STEEPEST or (steep > NEARLY_SINGULAR and bends(s, b)):
+        status = SINGULAR
     return status
+
+
+def goes(s: Transmission, u: Row[U], b: Pose) -> Int:
+    """Go to inputs in one step; return what became of it."""
+    status: Int = sets_out(s, u, b)
+    if status == CONVERGED:
+        status = settle(s, MAX_CORRECTIONS, SMALL_ERROR, b)
+    return arrives(s, b) if status == CONVERGED else status
 
 
 def accept(s: Transmission, b: Pose):

@@ -104,6 +104,10 @@ class CSolver(SolverPrinter):
             return f"{'const ' * is_const}{self.kind(kind.base)} *{name}"
         return f"{'const ' if kind.dims else ''}{BASES[kind.base]} {'*' * bool(kind.dims)}{name}"
 
+    def linkage(self, name: str) -> str:
+        """Return what stands before a function: that it is of the file alone."""
+        return "" if name in PUBLIC else "static "
+
     def head(self, item: Function) -> Lines:
         """Return the first lines of a function."""
         self.own, self.variables = item, list(variables_in(item.body))
@@ -112,7 +116,7 @@ class CSolver(SolverPrinter):
         listed = ", ".join(x.replace(" ", HELD) for x in given)
         kind = self.kind(item.result.base)
         name = f"{self.name}_{item.name}" if item.name in PUBLIC else item.name
-        start = f"{'static ' * (item.name not in PUBLIC)}{kind} {name}({listed})"
+        start = f"{self.linkage(item.name)}{kind} {name}({listed})"
         lines = textwrap.wrap(start, WIDTH, subsequent_indent="    ")
         return [*(x.replace(HELD, " ") for x in lines), "{"]
 
