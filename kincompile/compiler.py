@@ -53,8 +53,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Compiled, Dynamics, Kind, Place
     from kincompile.structure.report import Inspection
 
-    LoadableSource = tuple[str, str, Mapping[str, NDArray[Any]], Mapping[str, str]]
-
 LOG = logging.getLogger(__name__)
 
 LARGEST_INLINE = 300
@@ -321,50 +319,6 @@ def _loadable(target: str, system: ConstraintSystem, form: str | None) -> str:
         LOG.info("%s is in grouped form, which C does not have: it stays NumPy's", system.name)
         return "numpy"
     return target
-
-
-def emit_loadable(model: Mechanism | ConstraintSystem, target: str) -> LoadableSource:
-    """Return the sources from which another process makes the module of `compile`.
-
-    Returns
-    -------
-    str, str, mapping
-        Name, text and arrays of the NumPy module.
-    mapping
-        The files of C that replace its functions, text by name; none for ``target="numpy"``.
-    """
-    system = system_of(model)
-    with _without_collector(system):
-        target = _loadable(target, system, None)
-        code = _lowered(system, None)
-        return _sources(code, target)
-
-
-def emit_forces(
-    model: Mechanism | ConstraintSystem, target: str
-) -> tuple[LoadableSource | None, LoadableSource, dict[str, tuple[str, ...]]]:
-    """Return what another process makes the forces of a mechanism from, as `emit_loadable`.
-
-    That is with the planned elimination, None where there is none; then with multipliers given; and
-    the bodies of each joint.
-    """
-    from kincompile.ir.forces import observing_forces
-
-    system = system_of(model)
-    target = _loadable(target, system, None)
-    code = _lowered(system, None)
-    assert isinstance(code, InlineProgram)
-    planned, given = (observing_forces(code, is_planned=x) for x in (True, False))
-    assert given is not None
-    first = None if planned is None else _sources(inline(planned), target)
-    return first, _sources(inline(given), target), _joints(system)
-
-
-def _sources(code: InlineProgram | GroupedProgram, target: str) -> LoadableSource:
-    """Return name, text and arrays of a NumPy module, and the files of C that it is to have."""
-    native = emit_program(target, code).files if target == "c" else {}
-    emitted = emit_program("numpy", code)
-    return code.program.name, emitted.source, emitted.arrays, native
 
 
 def _joints(system: ConstraintSystem) -> dict[str, tuple[str, ...]]:

@@ -19,7 +19,7 @@ import numpy as np
 from kincompile import quantities
 from kincompile.errors import ContractError, InputError
 from kincompile.names import listed
-from kincompile.runtime.engine.code import attach, functions
+from kincompile.runtime.engine.code import ORIGIN, attach, functions
 from kincompile.runtime.memory import empty
 from kincompile.runtime.results.html import module_html
 
@@ -98,6 +98,7 @@ def from_source(
     module = ModuleType(name)
     if arrays:
         vars(module)["ARRAYS_OF_COMPANION"] = dict(arrays)
+    vars(module)[ORIGIN] = name, source, arrays or {}, {}
     return _fill(module, filename, source)
 
 

@@ -14,6 +14,7 @@ from kincompile.errors import InputError, memory_for, package_of_extra
 from kincompile.names import escaped, listed
 from kincompile.runtime.results.columns import TIME_UNIT, unit_attributes
 from kincompile.sweeps.layout import PENDING, STATUS, TIME, Layout
+from kincompile.sweeps.worker import digest_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -184,7 +185,7 @@ def marks_of(job: Job, plan: Plan, given: Array, assembly: int | None) -> dict[s
     for name, values in plan.sweep.items():
         sweep += [name.encode(), values.tobytes()]
     parts = {
-        "model": (job.sources.digest.encode(),),
+        "model": (digest_of(job.code).encode(),),
         "parameters": tuple(sweep),
         "times": (job.t.tobytes(),),
         "columns and measures": tuple(repr(item).encode() for item in job.layout.kept),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.errors import InputError
-from kincompile.names import listed, suggestion
+from kincompile.names import listed, rate_of, suggestion
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import TIME_UNIT
@@ -138,7 +138,9 @@ def read_layout(
         except InputError as error:
             problems += error.problems
         else:
-            kept[column.name] = Kept(column.name, column.unit, column.name, is_force=is_force)
+            is_known = is_force or rate_of(column.name, solution.names)
+            asked = column.name if is_known else str(name)  # the point of a joint
+            kept[column.name] = Kept(column.name, column.unit, asked, is_force=is_force)
     for name in names_of(measures, "measures"):
         try:
             item = _measure(solution, name, bearing)

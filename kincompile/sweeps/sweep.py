@@ -1,6 +1,6 @@
 """A mechanism at many sets of parameters, in chunks.
 
-model      -> Sources     emitted source, and the module of this process      compiler.sources
+model      -> Compiled    the module of this process; workers make their own  compiler.compile
 parameters -> Plan        variants, cut into chunks                           plan
 names      -> Layout      columns and measures that are kept                  layout
 all        -> Job         what every chunk has in common                      worker
@@ -10,17 +10,16 @@ chunks     -> executor    those that are missing, a few at a time             ch
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.compiler import emit_forces, emit_loadable
+from kincompile.compiler import compile as compiled
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.errors import InputError, SweepError
 from kincompile.model.mechanism import system_of
 from kincompile.names import escaped
-from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.engine.code import FORCES, code_of
 from kincompile.runtime.inputs import mapping_of, read_inputs, read_sweep
 from kincompile.runtime.solve import solve
 from kincompile.sweeps.chunks import StoppedError, solved
@@ -29,7 +28,7 @@ from kincompile.sweeps.layout import bearing_of, read_layout
 from kincompile.sweeps.plan import Plan, chunk_size
 from kincompile.sweeps.result import Sweep
 from kincompile.sweeps.store import open_store
-from kincompile.sweeps.worker import Job, Sources
+from kincompile.sweeps.worker import Job
 
 if TYPE_CHECKING:
     import os
@@ -78,8 +77,8 @@ def sweep(
     t : float or array_like, shape (N,), or None
         The times; None for those of the model.
     columns : sequence of str, optional
-        What is kept over time: coordinates, outputs and their rates, as in a solution. Without
-        `columns` and `measures` it is the outputs, of a model without any the coordinates.
+        What is kept over time: coordinates, outputs, points of joints and their rates, as in a
+        solution. Without `columns` and `measures` it is the outputs, of a model without any the coordinates.
     measures : sequence of str
         What is kept of each motion, as ``"foot.x.stroke"``: of an output its least, t_least,
         greatest, t_greatest, stroke, period, time_ratio, mean or rms; of a force, as in
@@ -127,16 +126,15 @@ def sweep(
     for name, count in counts.items():
         if count is not None and not (isinstance(count, int | np.integer) and count >= 1):
             raise InputError(f"{name} is {count!r}: give a whole number of at least 1.")
-    sources = Sources(*emit_loadable(model, target))
-    module = sources.module()
+    module = compiled(model, target)
     t = _times(model) if t is None else t
     plan, inputs = _planned(module, p, t, guess, product, chunk, through)
     first = dict(zip(module.PARAMETERS, plan.sets(0)[0].tolist(), strict=True))
     begin = solve(module, inputs.t[:1], first, guess, assembly=assembly)
     # All chunks start from one position, so that one assembly is meant in all.
     position = begin.q[0] if begin.success else inputs.guess
-    layout, sources = _layout(model, target, sources, begin, columns, measures)
-    job = Job(sources, inputs.t, position, plan.sets(0)[0], layout, None, through)
+    layout = _layout(begin, columns, measures)
+    job = Job(inputs.code, inputs.t, position, plan.sets(0)[0], layout, None, through)
     units = {name: module.UNITS[name] for name in module.PARAMETERS}
     marks = marks_of(job, plan, inputs.guess, assembly)
     contents = Contents(module.NAME, plan, job.layout, job.t, units, marks)
@@ -150,26 +148,16 @@ def sweep(
     return result
 
 
-def _layout(
-    model: Mechanism | ConstraintSystem,
-    target: str,
-    sources: Sources,
-    begin: Solution,
-    columns: Sequence[str] | None,
-    measures: Sequence[str],
-) -> tuple[Layout, Sources]:
-    """Read what is kept; where forces are among it, workers get their source too."""
+def _layout(begin: Solution, columns: Sequence[str] | None, measures: Sequence[str]) -> Layout:
+    """Read what is kept; where forces are among it, workers get their code too."""
     try:
-        return read_layout(begin, columns, measures), sources
+        return read_layout(begin, columns, measures)
     except InputError:
-        code = code_of(sources.module())
+        code = code_of(begin.require_module("its forces"))
         if code.lanes is None or not code.has_loads:
             raise
-    planned, given, joints = emit_forces(model, target)
-    first = None if planned is None else Sources(*planned)
-    sources = replace(sources, forces=(first, Sources(*given), joints))
-    begin = replace(begin, module=sources.module())
-    return read_layout(begin, columns, measures, bearing_of(begin)), sources
+    code.request(FORCES, False)  # for points at which elimination cannot be trusted
+    return read_layout(begin, columns, measures, bearing_of(begin))
 
 
 def _times(model: Mechanism | ConstraintSystem) -> Array:

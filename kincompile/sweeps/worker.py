@@ -1,34 +1,33 @@
-"""What a worker does: it makes the module from the emitted source, once, and solves chunks.
+"""What a worker does: it makes a mechanism from its emitted source, once, and solves chunks.
 
 This module loads neither SymPy nor the compiler, so that a worker starts quickly.
 """
 
 from __future__ import annotations
 
+import copyreg
 import hashlib
 import multiprocessing
 import os
 import threading
 import warnings
-from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from kincompile.errors import KincompileWarning
-from kincompile.runtime.engine.code import FORCES, JOINTS, code_of
+from kincompile.runtime.engine.code import FORCES, JOINTS, POINTS, Compiled, code_of
 from kincompile.runtime.load import from_source
 from kincompile.runtime.native.module import make_native
 from kincompile.runtime.solve import solve_sets
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from types import ModuleType
 
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.code import Array, Compiled
+    from kincompile.runtime.engine.code import Array, Origin
     from kincompile.sweeps.layout import Layout
 
 
@@ -39,66 +38,55 @@ class Writer(Protocol):
         """Keep the values of a chunk, by name, whose parameters are (B, k)."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sources:
-    """The emitted source of a mechanism, from which a worker makes its module."""
+KEPT = 16
+"""Mechanisms that a process keeps of those that it was sent."""
 
-    name: str  # of the mechanism
-    numpy: str  # text of the NumPy module
-    arrays: Mapping[str, NDArray[Any]]  # what that would read from a companion file
-    native: Mapping[str, str]  # text of the C files by name; none where C is not used
-    # those of its forces, planned and with multipliers given, and its joints; where they are wanted
-    forces: tuple[Sources | None, Sources, Mapping[str, tuple[str, ...]]] | None = None
-    digest: str = field(init=False)  # of all of them: a worker compiles what has one digest once
+SENT = (FORCES, JOINTS, POINTS)
+"""What goes with a mechanism of what was compiled on request."""
 
-    def __post_init__(self) -> None:
-        """Compute the digest."""
-        found = hashlib.sha256()
-        for part in (self.numpy, *self.native, *self.native.values(), *self.arrays):
-            found.update(part.encode() + b"\0")
-        if self.forces is not None:
-            planned, given, _ = self.forces
-            found.update(((planned.digest if planned else "") + given.digest).encode())
-        for array in self.arrays.values():
-            found.update(np.ascontiguousarray(array).tobytes())
-        object.__setattr__(self, "digest", found.hexdigest())
-
-    def __eq__(self, other: object) -> bool:
-        """Say whether two have the same text."""
-        return isinstance(other, Sources) and self.digest == other.digest
-
-    def __hash__(self) -> int:
-        """Return a number that goes with `__eq__`."""
-        return hash(self.digest)
-
-    def module(self) -> ModuleType:
-        """Return the module, compiled once a process."""
-        return _module(self)
+known: dict[str, Compiled] = {}
 
 
-@lru_cache(maxsize=8)
-def _module(sources: Sources) -> ModuleType:
-    module = from_source(sources.numpy, sources.name, sources.arrays)
-    module = make_native(module, sources.native) if sources.native else module
-    if sources.forces is not None:
-        makers, joints = code_of(module).makers, sources.forces[2]
-        makers |= {FORCES: partial(_forces, sources), JOINTS: lambda: joints}
-    return module
+def digest_of(code: Compiled) -> str:
+    """Return the digest of all that decides the numbers of a mechanism, forces where wanted."""
+    assert code.origin is not None
+    _, text, arrays, native = code.origin
+    found = hashlib.sha256()
+    for part in (text, *native, *native.values(), *arrays):
+        found.update(part.encode() + b"\0")
+    forces = (code.made.get((FORCES, (is_planned,))) for is_planned in (True, False))
+    found.update("".join(digest_of(item) for item in forces if item).encode())
+    for array in arrays.values():
+        found.update(np.ascontiguousarray(array).tobytes())
+    return found.hexdigest()
 
 
-def _forces(sources: Sources, is_planned: bool) -> Compiled | None:
-    """Return the compiled forces, as `FORCES` describes."""
-    assert sources.forces is not None
-    planned, given, _ = sources.forces
-    chosen = planned if is_planned else given
-    return None if chosen is None else code_of(chosen.module())
+def _packed(code: Compiled) -> tuple[Any, ...]:
+    """Return by what function and from what another process makes a mechanism again."""
+    sent = {place: made for place, made in code.made.items() if place[0] in SENT}
+    return _unpacked, (digest_of(code), code.origin, sent)
+
+
+def _unpacked(digest: str, origin: Origin, sent: dict[Any, Any]) -> Compiled:
+    """Return a mechanism that was sent; what has one digest is compiled once."""
+    if digest not in known:
+        name, text, arrays, native = origin
+        module = from_source(text, name, arrays)
+        known[digest] = code_of(make_native(module, native) if native else module)
+        if len(known) > KEPT:
+            del known[next(iter(known))]
+    known[digest].made.update(sent)
+    return known[digest]
+
+
+copyreg.pickle(Compiled, _packed)
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
     """What all chunks of a sweep have in common."""
 
-    sources: Sources  # the emitted source
+    code: Compiled  # the mechanism
     t: Array  # (N,): the times
     guess: Array  # (n,): where every chunk starts
     p: Array  # (k,): the parameters with which that is a position
@@ -115,8 +103,7 @@ def run(job: Job, number: int, sets: Array) -> dict[str, NDArray[Any]] | None:
     """Solve a chunk and write it, or return its values by name, (B, N) over time, else (B,)."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", KincompileWarning)  # statuses say the same
-        module = job.sources.module()
-        solution = solve_sets(module, job.t, sets, job.guess, job.p, through=job.through)
+        solution = solve_sets(job.code.module, job.t, sets, job.guess, job.p, through=job.through)
         values = job.layout.values(solution)
     if job.writer is None:
         return values

@@ -39,8 +39,14 @@ class Kind(Generic[T]):
     then: str = ""
 
 
+ORIGIN = "_origin"
+"""Where it keeps what it was made from."""
+
 Place = tuple[int, int]
 """Row and column."""
+
+Origin = tuple[str, str, "Mapping[str, NDArray[Any]]", "Mapping[str, str]"]
+"""Name and text of a NumPy module, its arrays, and the files of C that replace its functions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +132,8 @@ class Compiled:
     # Of a module with outputs: gives them at one state of plain floats, (q, q_dot, q_ddot, t, p);
     # None where its functions are compiled.
     observe_floats: Callable[..., Sequence[float]] | None
+    # What another process makes it from; None of a module from a file.
+    origin: Origin | None
     # What compiles more of the mechanism, and what it has compiled, by kind and key.
     makers: dict[Kind[Any], Callable[..., Any]]
     made: dict[tuple[Kind[Any], Hashable], Any]
@@ -136,6 +144,10 @@ class Compiled:
             self.made[kind, key] = self._maker(kind)(*key)
         found: T = self.made[kind, key]
         return found
+
+    def has(self, kind: Kind[Any]) -> bool:
+        """Say whether a request is, or was, for something that there is."""
+        return kind in self.makers or any(kind == made for made, _ in self.made)
 
     def _maker(self, kind: Kind[Any]) -> Callable[..., Any]:
         if kind in self.makers:
@@ -152,11 +164,11 @@ class Compiled:
 
     def points(self) -> Compiled:
         """Return the code with the points of the joints as outputs; of a file the file's own."""
-        return self.request(POINTS) if POINTS in self.makers else self
+        return self.request(POINTS) if self.has(POINTS) else self
 
     def undriven(self) -> str:
         """Return which drivers are missing, where equations depend on others everywhere; or ""."""
-        return self.request(UNDRIVEN) if UNDRIVEN in self.makers else ""
+        return self.request(UNDRIVEN) if self.has(UNDRIVEN) else ""
 
     def columns(
         self,
@@ -332,6 +344,7 @@ def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compi
         march=names.get("compiled_march"),
         observe_into=_observing(names, lanes),
         observe_floats=observe and partial(observe, names["FLOATS"]),
+        origin=names.get(ORIGIN),
         makers={},
         made={},
     )

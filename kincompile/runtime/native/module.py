@@ -16,7 +16,7 @@ import numpy as np
 
 from kincompile import quantities
 from kincompile.errors import InputError
-from kincompile.runtime.engine.code import attach, code_of
+from kincompile.runtime.engine.code import ORIGIN, attach, code_of
 from kincompile.runtime.memory import empty
 from kincompile.runtime.native.library import library
 from kincompile.runtime.native.points import (
@@ -79,6 +79,8 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
         function.__name__, function.__module__ = name, module.__name__
         function.__doc__ = function.__doc__ or names[name].__doc__
     names.update(compiled)
+    if code.origin is not None:
+        names[ORIGIN] = *code.origin[:3], files
     attach(module, code.position)
     return module
 

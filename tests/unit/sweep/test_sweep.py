@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import kincompile as kc
+from kincompile.runtime.engine.code import code_of
 from kincompile.sweeps.plan import Plan
 from tests.unit.sweep.models import TIMES, crank, files_of, folding, processes
 
@@ -236,3 +237,19 @@ def test_a_sweep_goes_through_bifurcations_where_it_is_told():
     np.testing.assert_allclose(found["phi_b"], 0, atol=1e-9)
     with pytest.raises(kc.InputError, match="through is 'straight'"):
         sweep(m, **options, through="straight")
+
+
+def test_a_mechanism_is_sent_as_its_source_and_made_again_once():
+    code = code_of(kc.compile(crank()))
+    first, again = (pickle.loads(pickle.dumps(code)) for _ in range(2))
+    assert first is again
+    assert first.module is not code.module
+    here, there = (kc.solve(x.module, TIMES, {"a": 0.9}) for x in (code, first))
+    np.testing.assert_array_equal(here.q_ddot, there.q_ddot)
+
+
+def test_workers_know_the_points_of_joints():
+    with processes(1) as pool:
+        found = sweep(columns=["A.x_dot", "tip.x"], executor=pool, chunk=8).to_xarray()
+    assert (found["status"] == 0).all()
+    np.testing.assert_allclose(found["x_A_dot"], 0, atol=1e-13)
