@@ -78,7 +78,8 @@ def sweep(
         The times; None for those of the model.
     columns : sequence of str, optional
         What is kept over time: coordinates, outputs, points of joints and their rates, as in a
-        solution. Without `columns` and `measures` it is the outputs, of a model without any the coordinates.
+        solution. Without `columns` and `measures` it is the outputs, of a model without any the
+        coordinates.
     measures : sequence of str
         What is kept of each motion, as ``"foot.x.stroke"``: of an output its least, t_least,
         greatest, t_greatest, stroke, period, time_ratio, mean or rms; of a force, as in
