@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
@@ -33,6 +33,9 @@ of the generic position, so that a vanishing step at tan(pi/2) is not taken for 
 TOLERANCE = 1e-10
 """Correction, in scales of the coordinates, at which Newton's method stops: convergence is
 quadratic, so that what is left is a rounding error."""
+
+STEP_TOLERANCE = 1e-9
+"""Relative tolerance of a step of a simulation."""
 
 LAST_CORRECTION = 1e-11
 """Correction, in scales, up to which Phi_q before it serves velocity and acceleration after it."""
@@ -135,6 +138,9 @@ of the largest residual, of a movement."""
 
 HALF = 1e-8
 """Part of a number that leaves half of its digits: up to it two that were solved for agree."""
+
+SAME = 1e-7
+"""Part of the largest up to which a motion repeats itself, and forces of a motion balance."""
 
 NEAR_MISS = 1e-3
 """What equations are missed by, relative to their terms, where they may hold after all."""
@@ -353,48 +359,6 @@ LATE = 1e-6
 
 IN_RANGE = 1e-6
 """Part of nu that the equations cannot give, below which a singular point is no lock-up."""
-
-SPATIAL_COORDINATES = 7
-"""Coordinates of a body in space: three of its place, then its Euler parameters."""
-
-
-def turning(units: Iterable[str], bodies: Iterable[Sequence[int] | range]) -> list[bool]:
-    """Return which coordinates have the scale of angles, whatever the unit of lengths.
-
-    They are the angles, and the Euler parameters, which are cosines and sines of half angles.
-
-    Parameters
-    ----------
-    units
-        The unit of each coordinate.
-    bodies
-        The columns of the coordinates of each body.
-    """
-    found = [unit == "rad" for unit in units]
-    for cover in covers(bodies):
-        for column in cover:
-            found[column] = True
-    return found
-
-
-def covers(bodies: Iterable[Sequence[int] | range]) -> list[Sequence[int]]:
-    """Return the columns of the Euler parameters of each body in space, of those of all bodies."""
-    return [columns[3:] for columns in bodies if len(columns) == SPATIAL_COORDINATES]
-
-
-def first_of_cover(n: int, bodies: Iterable[Sequence[int] | range]) -> list[int]:
-    """Return of each of n coordinates the first Euler parameter of its body; n of all others."""
-    found = [n] * n
-    for cover in covers(bodies):
-        for column in cover:
-            found[column] = cover[0]
-    return found
-
-
-def may_turn(units: Iterable[str], bodies: Iterable[Sequence[int] | range]) -> list[bool]:
-    """Return which coordinates are angles, or may be: free ones whose unit is not known."""
-    owned = {column for columns in bodies for column in columns}
-    return [unit == "rad" or not (unit or k in owned) for k, unit in enumerate(units)]
 
 
 def size_of(

@@ -2,7 +2,7 @@
 
 Kernels, programs, the interpreter, the targets, the contract of an emitted module, its compiled
 functions and its verification go through this table. A new quantity is one entry here and the code
-that computes it: outputs of that name in the kernels.
+that computes it: outputs of that name in the kernels. At the end it says which coordinates turn.
 """
 
 from __future__ import annotations
@@ -194,3 +194,46 @@ def pattern_of(quantity: Quantity) -> str:
 def states_of(names: Iterable[str]) -> tuple[str, ...]:
     """Return what quantities read of q, q_dot and q_ddot together."""
     return max((quantity_named(name).states for name in names), key=len)
+
+
+SPATIAL_COORDINATES = 7
+"""Coordinates of a body in space: three of its place, then its Euler parameters."""
+
+
+def turning(units: Iterable[str], bodies: Iterable[Sequence[int] | range]) -> list[bool]:
+    """Return which coordinates have the scale of angles, whatever the unit of lengths.
+
+    They are the angles, and the Euler parameters, which are cosines and sines of half angles.
+
+    Parameters
+    ----------
+    units
+        The unit of each coordinate.
+    bodies
+        The columns of the coordinates of each body.
+    """
+    found = [unit == "rad" for unit in units]
+    for cover in covers(bodies):
+        for column in cover:
+            found[column] = True
+    return found
+
+
+def covers(bodies: Iterable[Sequence[int] | range]) -> list[Sequence[int]]:
+    """Return the columns of the Euler parameters of each body in space, of those of all bodies."""
+    return [columns[3:] for columns in bodies if len(columns) == SPATIAL_COORDINATES]
+
+
+def first_of_cover(n: int, bodies: Iterable[Sequence[int] | range]) -> list[int]:
+    """Return of each of n coordinates the first Euler parameter of its body; n of all others."""
+    found = [n] * n
+    for cover in covers(bodies):
+        for column in cover:
+            found[column] = cover[0]
+    return found
+
+
+def may_turn(units: Iterable[str], bodies: Iterable[Sequence[int] | range]) -> list[bool]:
+    """Return which coordinates are angles, or may be: free ones whose unit is not known."""
+    owned = {column for columns in bodies for column in columns}
+    return [unit == "rad" or not (unit or k in owned) for k, unit in enumerate(units)]

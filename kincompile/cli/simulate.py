@@ -8,6 +8,7 @@ import kincompile as kc
 from kincompile.cli import shared
 from kincompile.cli.motion import Motion, set_values, time_options
 from kincompile.cli.progress import progress_bar
+from kincompile.criteria import STEP_TOLERANCE
 from kincompile.errors import InputError
 from kincompile.runtime.dynamics.integrate import METHODS
 from kincompile.runtime.results.write import require_known_suffix, summary
@@ -38,7 +39,7 @@ from kincompile.runtime.results.write import require_known_suffix, summary
     help="End where a coordinate or output has this value; a name may have several.",
 )
 @click.option("--method", type=click.Choice(METHODS), default="DOP853", help="The integrator.")
-@click.option("--rtol", type=float, default=1e-9, help="Relative tolerance of a step.")
+@click.option("--rtol", type=float, default=STEP_TOLERANCE, help="Relative tolerance of a step.")
 @click.option("--through", type=click.Choice(["smooth"]), help="Go on past singular positions.")
 @shared.deg_option("Show and write angles in degrees.")
 @click.option("--forces", "has_forces", is_flag=True, help="Reactions and drivers' torques too.")

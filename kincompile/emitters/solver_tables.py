@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from kincompile import criteria
+from kincompile import criteria, quantities
 from kincompile.solver.vocabulary import COUNTS, CRITERIA, START_COUNTS, START_CRITERIA
 
 if TYPE_CHECKING:
@@ -24,9 +24,9 @@ def solver_tables(program: Program) -> dict[str, Sequence[float]]:
     columns = [body.columns for body in program.bodies]
     most = max(len(units), len(program.equations))
     return {
-        "ANGULAR": criteria.turning(units, columns),
+        "ANGULAR": quantities.turning(units, columns),
         "IS_REDUNDANT": [name in program.redundant for name in program.equations],
         "PROBE": criteria.probe_of(most).tolist(),
-        "MAY_TURN": criteria.may_turn(units, columns),
-        "COVER": criteria.first_of_cover(len(units), columns),
+        "MAY_TURN": quantities.may_turn(units, columns),
+        "COVER": quantities.first_of_cover(len(units), columns),
     }

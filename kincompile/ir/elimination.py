@@ -17,11 +17,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import NOISE, SAFE_PIVOT, SLIGHT, probe_of, rounded, size_of, turning
+from kincompile.criteria import NOISE, SAFE_PIVOT, SLIGHT, probe_of, rounded, size_of
 from kincompile.ir.graph import Constant, Graph, Node
 from kincompile.ir.inline import input_name
 from kincompile.ir.interpret import apply, evaluator
 from kincompile.ir.looks import Look, parts_of
+from kincompile.quantities import turning
 from kincompile.structure.blocks import Block, block_triangular
 
 if TYPE_CHECKING:

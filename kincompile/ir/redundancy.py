@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import turning
 from kincompile.errors import StructuralError
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.model.resolve import Joint
 from kincompile.names import listed, rate
+from kincompile.quantities import turning
 from kincompile.structure.choice import rows_left_out
 from kincompile.structure.counting import counting_problem
 from kincompile.structure.rank import ANGLES_FIRST, RankReport, drivers_of, generic_rank

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from kincompile.criteria import AGREEMENT, SOLVED, turning
+from kincompile.criteria import AGREEMENT, SOLVED
 from kincompile.errors import InputError, StructuralError
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.elimination import plan_solve, sizes_of
@@ -24,6 +24,7 @@ from kincompile.ir.observing import observing_program
 from kincompile.ir.straight_solve import StraightSolve
 from kincompile.model.points import OutputColumn
 from kincompile.names import rate
+from kincompile.quantities import turning
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -158,10 +159,7 @@ def transmission_code(
         tuple(inputs.values()),
         tuple(outputs),
         tuple(free),
-        (
-            *(bool(is_angle[k]) for k in free),
-            *(bool(x) for x in turning([of_parameters[name] for name in inputs], [])),
-        ),
+        (*(is_angle[k] for k in free), *(of_parameters[name] == "rad" for name in inputs)),
         size,
         {
             **{x.name: x.unit for x in program.coordinates},

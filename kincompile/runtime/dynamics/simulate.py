@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import HALF, MAX_ITERATIONS, RANK, TOLERANCE
+from kincompile.criteria import HALF, MAX_ITERATIONS, RANK, STEP_TOLERANCE, TOLERANCE
 from kincompile.errors import InputError, SolveError
 from kincompile.names import column_name, force_units, listed, rate, suggestion
 from kincompile.runtime.dynamics.equations import Equations, dynamics_of
@@ -57,7 +57,7 @@ def simulate(
     events: Mapping[str, ArrayLike] | None = None,
     stops: Mapping[str, ArrayLike] | None = None,
     method: str = "DOP853",
-    rtol: float = 1e-9,
+    rtol: float = STEP_TOLERANCE,
     atol: float | None = None,
     max_step: float = math.inf,
     through: str | None = None,

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kincompile import quantities
-from kincompile.criteria import SPATIAL_COORDINATES, covers, may_turn, turning
 from kincompile.errors import InputError, StructuralError, UnsupportedError
 from kincompile.names import column_name, listed, rate, rate_of, suggestion
 
@@ -319,9 +318,9 @@ def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compi
         constant=_constant(entries, len(names["EQUATIONS"]), len(coordinates)),
         varying=_varying(entries),
         without_guess=tuple(body for body, k, n in bodies if not any(given[k : k + n])),
-        angular=np.array(turning(units, places), dtype=bool),
-        covers=np.array(covers(places), dtype=int).reshape(-1, SPATIAL_COORDINATES - 3),
-        may_turn=np.array(may_turn(units, places), dtype=bool),
+        angular=np.array(quantities.turning(units, places), dtype=bool),
+        covers=np.array(quantities.covers(places), dtype=int).reshape(-1, 4),
+        may_turn=np.array(quantities.may_turn(units, places), dtype=bool),
         nonzeros=names["Phi_q_nonzeros"],
         written=written or names["position"],
         functions=known,

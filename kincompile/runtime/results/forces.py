@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import HALF, RANK, TINY, probe_of
+from kincompile.criteria import HALF, RANK, SAME, TINY, probe_of
 from kincompile.errors import InputError, SingularConfigurationWarning
 from kincompile.html import Tabled
 from kincompile.names import column_name, listed, multiplier, unknown
@@ -30,9 +30,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Array, Compiled
-
-BALANCED = 1e-7
-"""Part of the largest force up to which the equations may be out of balance."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -376,7 +373,7 @@ def _by_matrices(own: Compiled, points: Points) -> tuple[Array, NDArray[np.bool_
     found = _given(own, points, powers * factors)
     is_shared = moved > HALF * np.abs(loose).max(axis=-1, keepdims=True, initial=0.0)
     rest = np.abs(np.einsum("lij,li->lj", matrix, factors) - sides).max(axis=-1)
-    off = rest > BALANCED * (np.abs(loads) + np.abs(inertia)).max(axis=-1, initial=TINY)
+    off = rest > SAME * (np.abs(loads) + np.abs(inertia)).max(axis=-1, initial=TINY)
     found[is_shared] = np.nan
     found[off] = np.nan
     return found, np.asarray(is_shared[~off].any(axis=0))

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import ROOT_LENGTH, SOLVED, STILL, ZERO
+from kincompile.criteria import ROOT_LENGTH, SAME, SOLVED, STILL, ZERO
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.results.between import ObservedMotion, derivative, together
@@ -36,9 +36,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.results.between import Between
     from kincompile.runtime.results.columns import MotionTable
-
-SAME = 1e-7
-"""Difference, relative to its stroke, up to which an output repeats itself."""
 
 GAUSS_PLACES = 8
 """Places for the integral over a step at whose ends a rate does not exist."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import COMPLEX_STEP, RANK, TINY, ZERO
+from kincompile.criteria import COMPLEX_STEP, RANK, SHORTEST_STEP, TINY, ZERO
 from kincompile.runtime.problem import nearest, problem
 from kincompile.runtime.status import Status
 
@@ -30,12 +30,6 @@ MOST_STEPS = 200
 
 REACH = 0.3
 """Longest step, in radians and sizes of the mechanism."""
-
-SHORTEST = 1e-10
-"""Part of a step that is tried last."""
-
-OVERSHOT = 0.5
-"""Part of the force before a step that may push back after it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -237,15 +231,16 @@ def _newton_move(place: Place, stiffness: Array) -> Array:
 def _moved(balance: Balance, place: Place, move: Array, down: Array) -> Place | None:
     """Return the position after as much of a step as does not overshoot; None where there is none.
 
-    Beyond the bottom the forces push back along `down`, which is zero where any step is good.
+    Beyond the bottom the forces push back along `down`, at most by half; that is zero where any
+    step is good.
     """
     part, push = 1.0, float(place.force @ down)
-    while part >= SHORTEST:
+    while part >= SHORTEST_STEP:
         following = balance.hold(place.q + part * (place.free @ move), place.point.t)
         if following is not None:
             way = following.free.T @ (place.free @ down / balance.scale**2)
             back = float(following.force @ way)
-            if back >= -OVERSHOT * push or abs(back) <= following.nothing:
+            if back >= -push / 2 or abs(back) <= following.nothing:
                 return following
         part /= 2
     return None

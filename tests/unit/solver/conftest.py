@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile import criteria
+from kincompile import criteria, quantities
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.problem import problem
@@ -34,7 +34,7 @@ def mechanism_of(module, lanes):
             "NONZEROS": len(module.PATTERN), "BLOCKS": len(determinants),
         },
         tables={
-            "ANGULAR": list(criteria.turning(units, columns)),
+            "ANGULAR": list(quantities.turning(units, columns)),
             "IS_REDUNDANT": [False] * m,
             "PROBE": criteria.probe_of(max(n, m)).tolist(),
             "PATTERN": module.PATTERN.tolist(),
