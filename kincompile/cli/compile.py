@@ -8,13 +8,20 @@ from typing import TYPE_CHECKING
 import click
 
 import kincompile as kc
-from kincompile.cli.shared import output_option, print_data, read_model, require_output
+from kincompile.cli.shared import (
+    output_option,
+    print_data,
+    read_model,
+    require_output,
+    transmission_option,
+)
 from kincompile.emitters.registry import TARGETS
 from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.writing import require_writable
 
 if TYPE_CHECKING:
+    from kincompile.cli.shared import Ends
     from kincompile.emitters.target import Emitted
 
 ENDINGS = {ending: name for name, item in TARGETS.items() for ending in item.endings}
@@ -31,12 +38,10 @@ ENDINGS = {ending: name for name, item in TARGETS.items() for ending in item.end
     help=f"What to emit: {listed(TARGETS)}.",
 )
 @click.option("--dynamics", is_flag=True, help="The accelerations that follow from forces too.")
-@click.option(
-    "--transmission",
-    metavar="INPUTS:OUTPUTS",
-    help="The mechanism as a function: names with commas, as left,right:pitch,roll.",
-)
-def command(model: str, output: str, target: str, dynamics: bool, transmission: str | None) -> None:
+@transmission_option("The mechanism as a function")
+def command(
+    model: str, output: str, target: str, dynamics: bool, transmission: Ends | None
+) -> None:
     """Write Phi, Phi_q, nu and gamma of MODEL as a module.
 
     The module imports NumPy and nothing else: it runs where kincompile is not installed. Where a
@@ -45,8 +50,7 @@ def command(model: str, output: str, target: str, dynamics: bool, transmission: 
     it has the right side for an integrator, accelerations(q, q_dot, t, p). With --transmission the
     file is a function from inputs, drivers or coordinates, to outputs, with its Jacobian.
     """
-    ends = None if transmission is None else _ends(transmission)
-    emitted = kc.emit(read_model(model), target, dynamics=dynamics, transmission=ends)
+    emitted = kc.emit(read_model(model), target, dynamics=dynamics, transmission=transmission)
     if emitted.unsolvable and not dynamics:
         click.echo(f"Warning: {emitted.unsolvable}", err=True)
     if output == "-":
@@ -58,17 +62,6 @@ def command(model: str, output: str, target: str, dynamics: bool, transmission: 
             require_output(path, model, "the model itself")
     for path in emitted.write(folder, main):
         click.echo(f"Wrote {path}", err=True)
-
-
-def _ends(text: str) -> tuple[list[str], list[str]]:
-    """Return the names of inputs and of outputs."""
-    parts = [[name.strip() for name in part.split(",")] for part in text.split(":")]
-    if len(parts) != 2 or not all(name for part in parts for name in part):
-        raise InputError(
-            f"--transmission {text} is not of the form INPUTS:OUTPUTS; write names with commas, "
-            "as left,right:pitch,roll"
-        )
-    return parts[0], parts[1]
 
 
 def _destination(output: str, emitted: Emitted, target: str) -> tuple[Path, str]:

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 import kincompile as kc
 from kincompile.cli.motion import set_values
-from kincompile.cli.shared import output_option, read_model, set_option
+from kincompile.cli.shared import (
+    output_option,
+    read_model,
+    set_option,
+    transmission_option,
+)
 from kincompile.errors import InputError
 from kincompile.writing import require_writable
+
+if TYPE_CHECKING:
+    from kincompile.cli.shared import Ends
 
 DERIVATIONS = (".slides.html", ".html", ".tex", ".md", ".ipynb")
 """Endings of the files that `derive` writes."""
@@ -30,6 +40,7 @@ FORMS = ("r-p", "r-omega")
     "--levels", default=",".join(LEVELS), metavar="LEVEL,...", help="Levels that are shown."
 )
 @click.option("--form", default=FORMS[0], metavar="FORM", help="In space: r-p, or r-omega (Haug).")
+@transmission_option("The Jacobian of the mechanism as a function")
 def command(
     model: str,
     output: str,
@@ -38,12 +49,15 @@ def command(
     constraint: str | None,
     levels: str,
     form: str,
+    transmission: Ends | None,
 ) -> None:
     """Show how Phi_q, nu and gamma of MODEL follow from Phi, step by step.
 
     A page for each constraint in nine steps (in vectors, in sines and cosines, in numbers) and for
     the assembled system. The numbers are taken where the mechanism is assembled at the time, by
-    default one at which nothing is special, or at the coordinates that are set.
+    default one at which nothing is special, or at the coordinates that are set. With --transmission
+    the page shows how the Jacobian of outputs by inputs follows from Phi_q: the elimination, the
+    chain rule, efforts and singular positions, with the numbers at the inputs that are set.
     """
     if not output.endswith(DERIVATIONS):
         raise InputError(f"{output}: a derivation is written as {', '.join(DERIVATIONS)}")
@@ -57,6 +71,7 @@ def command(
         constraint=constraint,
         levels=[level.strip() for level in levels.split(",") if level.strip()],
         form=form,
+        transmission=transmission,
     )
     found.write(output)
     click.echo(f"Wrote {output}", err=True)

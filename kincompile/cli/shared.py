@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.results.solution import Solution
 
+    Ends = tuple[list[str], list[str]]
+    """Names of the inputs and of the outputs of a transmission."""
+
     Command = Callable[..., None]
 
 DIFFERENT, USAGE_OR_MODEL, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
@@ -55,6 +58,30 @@ def set_option(what: str) -> Callable[[Command], Command]:
     """Return the option ``--set NAME=VALUE``, which gives values by name."""
     text = f"Value of a {what}, such as a=0.25 or phi=30deg; may be given several times."
     return click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help=text)
+
+
+def transmission_option(text: str) -> Callable[[Command], Command]:
+    """Return the option ``--transmission INPUTS:OUTPUTS``, which gives names of both, or None."""
+    return click.option(
+        "--transmission",
+        metavar="INPUTS:OUTPUTS",
+        callback=_ends,
+        help=f"{text}: names with commas, as left,right:pitch,roll.",
+    )
+
+
+def _ends(context: click.Context, option: click.Parameter, given: str | None) -> Ends | None:
+    """Return the names of inputs and of outputs."""
+    del context, option
+    if given is None:
+        return None
+    parts = [[name.strip() for name in part.split(",")] for part in given.split(":")]
+    if len(parts) != 2 or not all(name for part in parts for name in part):
+        raise InputError(
+            f"--transmission {given} is not of the form INPUTS:OUTPUTS; write names with commas, "
+            "as left,right:pitch,roll"
+        )
+    return parts[0], parts[1]
 
 
 def table_options(table: type) -> Callable[[Command], Command]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kincompile.derivations.assembled import assembled_section, unknowns_section
+from kincompile.derivations.elimination import evaluation_of
 from kincompile.derivations.equation_section import equation_section
 from kincompile.derivations.evaluation import Evaluation, evaluation
 from kincompile.derivations.figures import Figures
@@ -21,6 +22,7 @@ from kincompile.derivations.joint_section import joint_section
 from kincompile.derivations.joint_terms import abbreviations
 from kincompile.derivations.load_section import load_abbreviations, loads_section
 from kincompile.derivations.slides import slides_of
+from kincompile.derivations.transmission_section import transmission_section
 from kincompile.derivations.turned_section import R_OMEGA, turned_section
 from kincompile.errors import InputError
 from kincompile.html import framed_html
@@ -34,17 +36,19 @@ from kincompile.report.to_latex import as_tex
 from kincompile.report.to_markdown import as_markdown
 from kincompile.report.to_notebook import as_notebook
 from kincompile.tables import counted
+from kincompile.transmissions.loop import loop_of
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from pathlib import Path
 
     from kincompile.calculus.expressions import Expression
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
     from kincompile.report.formulas import Glyph
+    from kincompile.transmissions.loop import Loop
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -128,6 +132,7 @@ def derivation(
     constraint: str | None = None,
     levels: Iterable[str] = LEVELS,
     form: str = BY_P,
+    transmission: tuple[Sequence[str], Sequence[str]] | None = None,
 ) -> Derivation:
     """Show how Phi_q, nu and gamma of a mechanism follow from Phi, step by step.
 
@@ -146,6 +151,10 @@ def derivation(
     form
         In space by what Phi_q has derivatives, and gamma the second rates: ``"r-p"`` (ME751) or
         ``"r-omega"``, r and small rotations pi' about the axes of the bodies (Haug).
+    transmission
+        Names of the inputs and of the outputs, as for `transmission`: then the page shows how the
+        Jacobian of the outputs by the inputs follows from Phi_q. The state is that of inputs and
+        parameters by name, of which those left out have their first values.
 
     Returns
     -------
@@ -160,6 +169,12 @@ def derivation(
         If the state has unknown names, the formulas have no finite values there, or there is no
         such constraint or level.
     """
+    if transmission is not None:
+        if constraint is not None or tuple(levels) != LEVELS or form != BY_P:
+            raise InputError(
+                "the derivation of a transmission is one: leave out constraint, levels and form."
+            )
+        return _of_transmission(loop_of(model, *transmission), state)
     system = system_of(model)
     _require_known(system, constraint, shown := tuple(levels))
     _require_form(system, constraint, form)
@@ -181,6 +196,14 @@ def derivation(
         chosen.source,
         _state_code(chosen),
     )
+
+
+def _of_transmission(loop: Loop, state: Mapping[str, float] | float | None) -> Derivation:
+    """Return how the Jacobian of a loop follows from its equations."""
+    chosen = evaluation_of(loop, state)
+    chapters = unknowns_section(Figures(chosen)), transmission_section(chosen, loop)
+    summary = f"{listed(loop.inputs)} to {listed(loop.outputs)}; {_summary(chosen)}"
+    return Derivation(loop.system.name, summary, chapters, {}, chosen.source, _state_code(chosen))
 
 
 def constraint_chapters(

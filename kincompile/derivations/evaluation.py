@@ -174,13 +174,14 @@ def evaluation(system: ConstraintSystem, state: Mapping[str, float] | float | No
     problem = counting_problem(system, code.pattern())
     given: dict[str, float] = {}
     if isinstance(state, int | float):
-        given["t"] = _finite("t", state)
+        given["t"] = finite_value("t", state)
     elif state is not None:
         given = _checked(system, state)
     return _evaluated(system, code, source, module, problem, given)
 
 
-def _finite(name: str, value: Any) -> float:
+def finite_value(name: str, value: Any) -> float:
+    """Return a number of a state, checked."""
     try:
         number = float(value)
     except (TypeError, ValueError):
@@ -200,7 +201,7 @@ def _checked(system: ConstraintSystem, state: Mapping[str, Any]) -> dict[str, fl
             f"the state names {listed(unknown)}{suggestion(unknown[0], known)}; names are: "
             f"{listed(known)}"
         )
-    return {str(name): _finite(str(name), value) for name, value in state.items()}
+    return {str(name): finite_value(str(name), value) for name, value in state.items()}
 
 
 def _evaluated(

@@ -18,11 +18,13 @@ ATTRIBUTES, CONSTRAINT, JACOBIAN, NU, GAMMA = 1, 2, 4, 5, 6
 
 
 def slides_of(document: Manuscript) -> Manuscript:
-    """Return a derivation with a section for each slide: the mechanism, then its constraints."""
-    unknowns, constraints, *_ = document.sections
+    """Return a derivation as slides: the mechanism, then constraints or the steps to J."""
+    unknowns, chapter, *_ = document.sections
     drawn = tuple(item for item in unknowns.blocks if isinstance(item, Figure))
+    is_nine = chapter.anchor == "constraints"  # of a transmission each step is a slide as it is
+    slides = map(_slide, chapter.sections) if is_nine else chapter.sections
     first = (Chapter("mechanism", ("The mechanism",), drawn),) if drawn else ()
-    return replace(document, sections=(*first, *map(_slide, constraints.sections)))
+    return replace(document, sections=(*first, *slides))
 
 
 def _slide(chapter: Chapter) -> Chapter:

@@ -129,6 +129,13 @@ class SolvePlan:
     # Size up to which blocks are straight-line code; LAPACK solves larger ones.
     straight: int = LARGEST_CLOSED_FORM
     looks: tuple[Look, ...] = ()  # at what was eliminated in a fixed order
+    # What is left of each equation where it is used, for pages that show the elimination: nodes by
+    # column, and of its right side.
+    rows: Mapping[int, Mapping[int, int]] = field(default_factory=dict, compare=False)
+    sides: Mapping[int, int] = field(default_factory=dict, compare=False)
+    # Of each Euler parameter that a small rotation replaces, the nodes that it is made of, by
+    # column of the stretch and the rotation.
+    bases: Mapping[int, Mapping[int, int]] = field(default_factory=dict, compare=False)
 
     @property
     def has_choices(self) -> bool:
@@ -240,7 +247,9 @@ def plan_entries(
     determinants: list[int] = []
     looks: list[Look] = []
     straight = LARGEST_CLOSED_FORM if turn is None else LARGEST_PIVOTED
+    used: dict[int, Mapping[int, int]] = dict(eliminated)
     for block in blocks:
+        used |= {row: dict(matrix[row]) for row in block.rows}
         if is_straight and len(block.rows) > straight:
             pivots_there, look = _eliminate_block(graph, block, matrix, right, solution, sizes)
             determinants += pivots_there
@@ -264,6 +273,9 @@ def plan_entries(
         tuple(item.columns[0] for item in rotations),
         straight,
         tuple(looks),
+        used,
+        right,
+        {column: terms for item in rotations for column, terms in item.bases.items()},
     )
 
 

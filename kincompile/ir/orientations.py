@@ -170,6 +170,14 @@ class SmallRotation:
                 if graph.value_of(found) != 0 and not samples.is_zero(found):
                     matrix[row][column] = found
 
+    @property
+    def bases(self) -> dict[int, dict[int, int]]:
+        """Nodes of which each Euler parameter is made, by column of s and pi'."""
+        return {
+            column: {own: vector[k] for own, vector in self._basis.items()}
+            for k, column in enumerate(self.columns)
+        }
+
     def finish(self, matrix: Matrix, solution: dict[int, int]) -> None:
         """Add dp to a solution that has pi'; other rows get the columns of p back."""
         for k, column in enumerate(self.columns):

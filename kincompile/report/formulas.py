@@ -41,12 +41,19 @@ class Sub:
 
 
 @dataclass(frozen=True, slots=True)
-class DerivativeSymbol:
+class DerivativeSymbol(Scalar):
     """The derivative of one formula by another: partial, or total with d."""
 
     numerator: Formula
     denominator: Formula
     sign: str = "\N{PARTIAL DIFFERENTIAL}"
+
+
+@dataclass(frozen=True, slots=True)
+class Differential(Scalar):
+    """The differential of a variable: d phi."""
+
+    variable: Formula
 
 
 @dataclass(frozen=True, slots=True)

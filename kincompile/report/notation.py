@@ -420,6 +420,9 @@ class Notation:
     def _sign(self, sign: str) -> Printed:
         return self._letter("d") if sign == "d" else self._operator(sign)
 
+    def _print_Differential(self, expr: fm.Differential) -> Printed:
+        return self._row([self._letter("d"), self._print(expr.variable)])
+
     def _print_Equated(self, expr: fm.Equated) -> Printed:
         return self._joined("=", expr.parts)
 
@@ -478,7 +481,7 @@ def _is_reciprocal(factor: Any) -> bool:
 
 
 def _place(factor: Any) -> int:
-    """Return where a factor stands: numbers first, rates last."""
+    """Return where a factor stands: numbers first, rates and differentials last."""
     if isinstance(factor, ex.Number | fm.Decimal):
         return 0
-    return 2 if is_rate(factor) else 1
+    return 2 if isinstance(factor, fm.Differential) or is_rate(factor) else 1

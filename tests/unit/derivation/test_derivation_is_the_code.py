@@ -18,13 +18,23 @@ from kincompile.ir.lower import lower
 from kincompile.model.resolve import Joint
 from kincompile.names import rate
 from kincompile.report.document import Display
-from kincompile.report.formulas import Call, Choice, Decimal, Equated, Quotient, Relation
+from kincompile.report.formulas import (
+    Call,
+    Choice,
+    Decimal,
+    DerivativeSymbol,
+    Differential,
+    Equated,
+    Glyph,
+    Quotient,
+    Relation,
+)
 from kincompile.runtime.load import from_source
 
 QUANTITIES = ("Phi", "Phi_q", "nu", "gamma")
 
 
-def evaluate(formula: Any, values: dict[str, float], tables: Any) -> Any:
+def evaluate(formula: Any, values: dict[Any, float], tables: Any) -> Any:
     """Return the number of a displayed formula, which knows nothing of the code it came from."""
     match formula:
         case Number(value) | Decimal(value):
@@ -33,6 +43,8 @@ def evaluate(formula: Any, values: dict[str, float], tables: Any) -> Any:
             return math.pi
         case Symbol(name):
             return values[name]
+        case Glyph() | Differential() | DerivativeSymbol():
+            return values[formula]
         case Sum(terms):
             return sum(evaluate(term, values, tables) for term in terms)
         case Product(factors):

@@ -108,9 +108,35 @@ def test_that_wrong_tables_are_named(tmp_path, table, message):
     assert message in result.stderr
 
 
-def test_that_the_example_is_the_same_as_data_and_prints_what_it_says(capsys):
-    model = runpy.run_path(str(FOLDER / "ankle.py"), run_name="__main__")["m"]
-    assert "actuators [0.207166 0.213622] m" in capsys.readouterr().out  # golden, T3-SPU pose 2
-    assert kc.emit(kc.read_model(ANKLE)).source == kc.emit(model).source
-    assert "transmission" in json.dumps(dict(kc.read_model(ANKLE).tasks))
+EXAMPLES = {
+    "ankle": "actuators [0.207166 0.213622] m",  # golden, T3-SPU pose 2
+    "crank_rocker": "ratio of the rates [0.4662,",
+    "five_bar": "motors [1.830595 0.942654] rad",  # golden, T6, the inverse at (0.02, 0.15)
+}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_that_an_example_is_the_same_as_data_and_prints_what_it_says(capsys, name):
+    model = runpy.run_path(str(FOLDER / f"{name}.py"), run_name="__main__")["m"]
+    assert EXAMPLES[name] in capsys.readouterr().out
+    read = kc.read_model(FOLDER / f"{name}.toml")
+    assert kc.emit(read).source == kc.emit(model).source
+    assert "transmission" in json.dumps(dict(read.tasks))
+    assert run(FOLDER / f"{name}.toml").exit_code == 0
+
+
+def test_that_there_is_a_test_of_every_example():
+    assert {path.stem for path in FOLDER.iterdir() if path.suffix} == set(EXAMPLES)
+
+
+def test_that_a_model_with_a_table_is_written_with_it():
     assert kc.read_model(ANKLE).to_toml().endswith(ANKLE.read_text().partition("\n\n")[2][-200:])
+
+
+def test_that_the_ratio_of_a_crank_rocker_is_that_of_the_textbook():
+    f = kc.transmission(kc.read_model(FOLDER / "crank_rocker.toml"), ["motor"], ["rocker.phi"])
+    poses = f.at(np.linspace(0, 2 * np.pi, 25)[:, np.newaxis])
+    names = [f.module.COORDINATES.index(f"phi_{body}") for body in ("crank", "coupler", "rocker")]
+    crank, coupler, rocker = poses.q[:, names].T
+    ratio = 0.04 * np.sin(coupler - crank) / (0.08 * np.sin(coupler - rocker))
+    np.testing.assert_allclose(poses.J[:, 0, 0], ratio, rtol=1e-11, atol=1e-13)
