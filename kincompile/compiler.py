@@ -296,7 +296,7 @@ def _makers(
         makers[kinds.UNDRIVEN] = partial(_undriven, system)
     if not isinstance(code, InlineProgram):  # that of a large mechanism is not worth its memory
         return makers
-    makers[kinds.SENSITIVITIES] = partial(_sensitivities, code, target)
+    makers[kinds.SENSITIVITIES] = partial(_sensitivities, code, compiled.module, target)
     makers[kinds.SENSITIVE] = partial(_with_sensitivities, code.program)
     if system.loads:
         makers[kinds.FORCES] = partial(_forces, code, target)
@@ -370,13 +370,27 @@ def _with_sensitivities(program: Program, names: tuple[str, ...]) -> Compiled:
 
 
 def _sensitivities(
-    code: InlineProgram, target: str, names: tuple[str, ...], of: tuple[str, ...], second: bool
+    code: InlineProgram,
+    module: ModuleType,
+    target: str,
+    names: tuple[str, ...],
+    of: tuple[str, ...],
+    second: bool,
+    is_near: bool,
 ) -> Compiled | None:
-    """Return code whose outputs are derivatives of columns, for `kc.sensitivities`."""
+    """Return code whose outputs are derivatives of columns, for `kc.sensitivities`.
+
+    `is_near` where its pivots are to be those of the position at the start: what large mechanisms
+    in space need, whose code takes a C compiler minutes.
+    """
     from kincompile.ir.implicit import observing_sensitivities
 
-    program = observing_sensitivities(code, names, of, second=second)
-    return None if program is None else _compiled(program, target)
+    q = _position(module) if is_near else None
+    if is_near and q is None:
+        return None
+    near = None if q is None else q.tolist()
+    program = observing_sensitivities(code, names, of, second=second, near=near)
+    return None if program is None else _compiled(program, "numpy" if is_near else target)
 
 
 def _forces(code: InlineProgram, target: str, is_planned: bool) -> Compiled | None:
@@ -489,12 +503,21 @@ def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
 
 def _assembled(model: Mechanism | ConstraintSystem) -> NDArray[np.float64] | None:
     """Return the position at the start that the runtime finds, with its restarts, or None."""
-    from kincompile.runtime.solve import solve
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RedundantConstraintWarning)
         try:
-            position = solve(compile(model), 0.0).q[0]
-        except KincompileError:  # it cannot be compiled, or no equation has a value there
+            module = compile(model)
+        except KincompileError:
             return None
+    return _position(module)
+
+
+def _position(module: ModuleType) -> NDArray[np.float64] | None:
+    """Return the position of a module at the start, or None."""
+    from kincompile.runtime.solve import solve
+
+    try:
+        position = solve(module, 0.0).q[0]
+    except KincompileError:  # no equation has a value there
+        return None
     return position if np.isfinite(position).all() else None

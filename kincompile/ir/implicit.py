@@ -55,18 +55,25 @@ DETERMINANT = "determinant_of_block_{}"
 
 
 def observing_sensitivities(
-    code: InlineProgram, names: Sequence[str], of: Sequence[str], *, second: bool = False
+    code: InlineProgram,
+    names: Sequence[str],
+    of: Sequence[str],
+    *,
+    second: bool = False,
+    near: Sequence[float] | None = None,
 ) -> Program | None:
     """Return a program without equations whose outputs are derivatives of a motion.
 
     They are those of the columns `of`, coordinates and outputs, by the parameters `names`, and of
     `second` ones also by each pair of them, after the part by which solves miss their equations and
     the determinants or pivots of the blocks of Phi_q; their rates are the derivatives of the rates.
-    None where the equations are structurally singular.
+    None where the equations are structurally singular. Pivots are chosen at a generic state, or
+    `near` an assembled position: what vanishes wherever the equations are met is no pivot there.
+    None where that makes no difference, since none of them varies.
     """
     check_names(code.program, names)
-    plan = plan_solve(code, is_straight=True)
-    if plan is None:
+    plan = plan_solve(code, is_straight=True, near=near)
+    if plan is None or (near is not None and not plan.looks):
         return None
     program, system = code.program, _Linearized(code, plan, names)
     columns = system.columns(of)

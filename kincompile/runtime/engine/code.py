@@ -219,7 +219,8 @@ SENSITIVITIES: Kind[Compiled | None] = Kind(
     "and that has no sensitivities: differentiate a part of it, or",
     "solve with that, then ask for sensitivities",
 )
-"""By names of parameters, of columns, and whether second derivatives are wanted; without equations.
+"""By names of parameters, of columns, whether second derivatives are wanted, and whether pivots are
+those of the position at the start in place of those of a generic state; without equations.
 Its outputs are by what part of their terms solves miss their equations, the determinants of the
 blocks of Phi_q, then by parameter, and by pair of them, the derivatives of the columns; None where
 there is no planned elimination."""

@@ -72,7 +72,7 @@ class Sensitivities(Tabled):
         Unit of each coordinate, output and parameter.
     second : ndarray, shape (3, N, n + r, k, k), or None
         Second derivatives of coordinates and outputs, of their rates and second rates; NaN also
-        where Phi_q is nearly singular, or the planned elimination misses its equations.
+        where Phi_q is nearly singular, or both planned eliminations miss their equations.
     """
 
     header = ("column", "by", "largest", "unit")
@@ -280,6 +280,9 @@ class _Asked:
             self._require_agreement(points.at(some[:: max(1, some.size // WITNESSES)]))
         with np.errstate(all="ignore"):
             found, is_trusted = self._by_plan(points)
+            # A pivot of a generic state may vanish wherever the equations are met.
+            for own, some_points in points.parts(finite & ~is_trusted):
+                found[..., own], is_trusted[own] = self._by_plan(some_points, is_near=True)
             for own, some_points in points.parts(finite & ~is_trusted):
                 found[:, :k, :, own] = self._by_matrices(some_points)
                 found[:, k:, :, own] = np.nan
@@ -305,9 +308,12 @@ class _Asked:
                 "together."
             )
 
-    def _by_plan(self, points: Points) -> tuple[Array, NDArray[np.bool_]]:
-        """Return the derivatives by the planned elimination, and where that can be trusted."""
-        code = self.code.request(SENSITIVITIES, self.names, self.columns, self.second)
+    def _by_plan(self, points: Points, *, is_near: bool = False) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the derivatives by the planned elimination, and where that can be trusted.
+
+        Its pivots are those of a generic state, or of the position at the start.
+        """
+        code = self.code.request(SENSITIVITIES, self.names, self.columns, self.second, is_near)
         k, count = len(self.names), points.t.size
         size = k + self.second * k * (k + 1) // 2, len(self.columns)
         if code is None:

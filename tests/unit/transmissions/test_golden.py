@@ -58,6 +58,17 @@ def test_that_outputs_and_derivatives_are_those_of_the_table(case):
     close(f.at(u).determinant, np.linalg.det(table["J"]))
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
+def test_that_cylinders_and_balled_rods_have_second_derivatives_too():
+    """A pivot that is planned at a generic state vanishes wherever the rods are assembled."""
+    f = kc.transmission(models.ankle_with_rods(), *ANKLE)
+    poses = GOLDEN["T3-SPU"]["poses"]
+    u, first, second = (np.array([x[key] for x in poses]) for key in ("u", "J", "d2x_du2"))
+    close(f.second(-u), second)  # the rods are measured against their axes
+    close(f.J(-u), -first)
+
+
 def test_that_rates_and_efforts_are_those_of_the_table(case):
     f, table = case
     u, u_dot = table["u"], table["u_dot"]
