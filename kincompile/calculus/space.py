@@ -19,6 +19,7 @@ from kincompile.calculus.expressions import (
     rotated,
     scaled,
     split_factor,
+    sum_of,
 )
 from kincompile.calculus.symbols import Frame
 from kincompile.names import rate
@@ -162,6 +163,23 @@ class SpatialFrame(Frame):
         """The rotation by p."""
         return EulerRotation(self.p)
 
+    def turned_about(self, axis: Vector) -> Change:
+        """Return p, and what it changes by in a turn at unit rate about a body-fixed axis."""
+        return self.p, scaled(HALF, TimesG(self.p, axis, is_transposed=True))
+
+    @property
+    def turns(self) -> tuple[dict[Expression, Expression], ...]:
+        """A turn about each of its axes."""
+        return tuple(dict([self.turned_about(axis)]) for axis in AXES)
+
+    def along_fixed_axes(self, components: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+        """Return the components along the fixed axes of a vector given along its own."""
+        turned = [self.A(axis) for axis in AXES]
+        return tuple(
+            sum_of(tuple(dot(axis, a) * x for a, x in zip(turned, components, strict=True)))
+            for axis in AXES
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class TurnedFrame(SpatialFrame):
@@ -186,7 +204,7 @@ class TurnedFrame(SpatialFrame):
         if coordinate != self.coordinates[1]:
             return coordinate, change
         assert not isinstance(change, Scalar)
-        return self.p, scaled(HALF, TimesG(self.p, change, is_transposed=True))
+        return self.turned_about(change)
 
 
 HALF = Number(Fraction(1, 2))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from kincompile.calculus.expressions import (
+    ONE,
     Basis,
     ProfileFunction,
     Scalar,
@@ -78,6 +79,19 @@ class Frame(Owner):
         """The rotation matrix A as a function of the coordinates."""
         raise NotImplementedError
 
+    @property
+    def turns(self) -> tuple[dict[Expression, Expression], ...]:
+        """What its coordinates change by when it turns at unit rates, about its own axes."""
+        raise NotImplementedError
+
+    def turned_about(self, axis: Vector) -> Change:
+        """Return what changes, and by what, in a turn at unit rate about an axis of its own."""
+        raise NotImplementedError
+
+    def along_fixed_axes(self, components: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+        """Return a moment along the fixed axes, of one along its own axes."""
+        raise NotImplementedError
+
     def A(self, vector: Vector) -> Vector:  # noqa: N802 - the rotation matrix of the textbook
         """Turn a body-fixed vector into the global frame."""
         return rotated(self.rotation, vector)
@@ -109,6 +123,15 @@ class PlaneFrame(Frame):
     def rotation(self) -> Rotation:
         """The rotation by phi."""
         return PlaneRotation(self.phi)
+
+    @property
+    def turns(self) -> tuple[dict[Expression, Expression], ...]:
+        """A turn in the plane."""
+        return ({self.phi: ONE},)
+
+    def along_fixed_axes(self, components: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+        """Return them: the one axis, normal to the plane, is fixed."""
+        return components
 
 
 @dataclass(frozen=True, slots=True)

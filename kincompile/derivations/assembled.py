@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from kincompile.derivations.figures import Figures
     from kincompile.ir.inline import Entry
     from kincompile.model.bodies import Body
+    from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.newton import NewtonResult
 
     Rows: TypeAlias = list[tuple[doc.Run | doc.Runs, ...]]
@@ -75,6 +76,11 @@ IDENTITIES = (
 """Identities where p^T p = 1 and p^T p_dot = 0, factors with a space between them."""
 
 
+def orientation_in_words(system: ConstraintSystem) -> list[doc.Block]:
+    """Return what the letters of an orientation mean, in space; an angle needs no words."""
+    return [doc.text(*EULER_PARAMETERS)] if system.ground.kind.turning[0] else []
+
+
 def unknowns_section(figures: Figures) -> doc.Chapter:
     """Return the mechanism drawn, its coordinates and parameters, with the chosen state."""
     evaluation = figures.evaluation
@@ -87,8 +93,9 @@ def unknowns_section(figures: Figures) -> doc.Chapter:
     if (shown := figures.mechanism()) is not None:
         blocks.append(doc.Figure(shown))
     blocks.append(doc.table(("column", "coordinate", "unit", "guess", "chosen state"), rows))
-    if len(evaluation.system.ground.kind.axes) > 2:
-        blocks.append(doc.text(*EULER_PARAMETERS))
+    letters = orientation_in_words(evaluation.system)
+    blocks += letters
+    if letters:
         rows_of_three = [IDENTITIES[k : k + 3] for k in range(0, len(IDENTITIES), 3)]
         lines = [tuple(doc.Verbatim(item) for item in row) for row in rows_of_three]
         blocks.append(

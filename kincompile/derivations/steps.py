@@ -89,8 +89,7 @@ class Steps(ABC, Generic[Derived]):
             "Entries of the Jacobian that are not listed are zero."
         )
         lines = self.evaluation.expansion(self.rows, QUANTITIES)
-        is_spatial = len(self.evaluation.system.ground.kind.axes) > 2
-        title = "Written out in components" if is_spatial else "Expanded to sines and cosines"
+        title = f"Written out in {self.evaluation.system.ground.kind.written_in}"
         return self.step(7, title, note, *lines, level="expanded")
 
     def placement(self) -> doc.Chapter:

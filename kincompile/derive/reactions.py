@@ -8,25 +8,17 @@ C(t) does the work :math:`\lambda^T \Phi_C \delta C`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cache
 from typing import TYPE_CHECKING
 
 from kincompile.calculus import expressions as ex
-from kincompile.calculus.symbols import C
+from kincompile.calculus.symbols import C, PlaneFrame
 from kincompile.calculus.template import Template
-from kincompile.derive.derivation import units
 from kincompile.derive.rules import along
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from kincompile.calculus.symbols import Frame
     from kincompile.derive.rules import Direction
-
-
-SPACE = 3
-"""Components of a vector in space."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,32 +99,20 @@ def _along_axis(
     (frame,) = (item for item in template.frames if item.index == index)
     v, last = ex.VectorSymbol(symbol, frame.size), template.frames[-1]
     unit = ex.Norm(v) ** -1 * frame.A(v)
-    if frame.size != SPACE:
+    if isinstance(frame, PlaneFrame):
         return tuple(_work(template, {last.r: way}) for way in (unit, ex.perpendicular(unit)))
     if not symbol.startswith("h_"):
         return (_work(template, {last.r: unit}),)
-    triad = [ex.VectorSymbol(f"{letter}_{index}", SPACE) for letter in "hfg"]
+    triad = [ex.VectorSymbol(f"{letter}_{index}", frame.size) for letter in "hfg"]
     force = [_work(template, {last.r: frame.A(item)}) for item in triad]
-    turns = [_turn(last, item) for item in triad] if frame == last else []
+    turns = [dict([frame.turned_about(item)]) for item in triad] if frame == last else []
     return (*force, *(_work(template, _about(last, point, turn)) for turn in turns))
 
 
 def _reaction(template: Template, frame: Frame, point: str | None) -> Reaction:
     force = (_work(template, {frame.r: ex.Basis(k, frame.size)}) for k in range(frame.size))
-    moment = [_work(template, _about(frame, point, turn)) for turn in _turns(frame)]
-    if frame.size == SPACE:
-        moment = _along_fixed_axes(frame, moment)
-    return Reaction(tuple(force), tuple(moment))
-
-
-def _along_fixed_axes(frame: Frame, components: list[ex.Scalar]) -> list[ex.Scalar]:
-    """Return the components along the fixed axes of a vector given along a body's axes."""
-    axes = [ex.Basis(k, SPACE) for k in range(SPACE)]
-    turned = [frame.A(axis) for axis in axes]
-    return [
-        ex.sum_of(tuple(ex.dot(axis, a) * x for a, x in zip(turned, components, strict=True)))
-        for axis in axes
-    ]
+    moment = tuple(_work(template, _about(frame, point, turn)) for turn in frame.turns)
+    return Reaction(tuple(force), frame.along_fixed_axes(moment))
 
 
 def _about(frame: Frame, point: str | None, turn: Direction) -> Direction:
@@ -140,24 +120,6 @@ def _about(frame: Frame, point: str | None, turn: Direction) -> Direction:
     if point is None:
         return turn
     return {**turn, frame.r: -along(frame.A(ex.VectorSymbol(point, frame.size)), turn)}
-
-
-def _turn(frame: Frame, axis: ex.Vector) -> Direction:
-    """Return the direction in which a body in space turns about an axis of its own."""
-    (p,) = (item for item in frame.coordinates if item != frame.r)
-    turn = ex.TimesG(p, axis, is_transposed=True)  # type: ignore[arg-type]  # p_dot = G^T omega'/2
-    return {p: ex.Number(Fraction(1, 2)) * turn}
-
-
-def _turns(frame: Frame) -> Iterator[Direction]:
-    """Yield the directions in which a body turns at unit rates: in space about its own axes."""
-    if frame.size == SPACE:
-        yield from (_turn(frame, ex.Basis(k, SPACE)) for k in range(SPACE))
-        return
-    for coordinate in frame.coordinates:
-        if coordinate != frame.r:
-            for unit in units(coordinate):
-                yield {coordinate: unit}
 
 
 def _work(template: Template, direction: Direction) -> ex.Scalar:

@@ -103,8 +103,9 @@ class ExerciseKit:
         return target
 
     def _hand_in(self, student: str, system: ConstraintSystem) -> str:
-        last = system.bodies[0].coordinates[-1]
-        turned = f"sin({last})" if len(system.ground.kind.axes) == len("xy") else last
+        body = system.bodies[0]
+        last = body.coordinates[-1]
+        turned = f"sin({last})" if body.kind.units[-1] == "rad" else last
         lines = [
             f"# {self.name}, student {student}. Write a formula after each = sign, for instance",
             f"#   B1 = -0.25*{turned}*{rate(last)}**2",

@@ -8,7 +8,7 @@ import sympy
 
 from kincompile.calculus.expressions import Symbol, VectorSymbol
 from kincompile.calculus.space import EulerRotation
-from kincompile.derivations.assembled import EULER_PARAMETERS
+from kincompile.derivations.assembled import orientation_in_words
 from kincompile.derivations.derivation import constraint_chapters
 from kincompile.derivations.evaluation import evaluation
 from kincompile.derivations.figures import Figures
@@ -71,26 +71,20 @@ def _mechanism(figures: Figures) -> doc.Chapter:
     blocks: list[doc.Block] = []
     if (shown := figures.mechanism()) is not None:
         blocks.append(doc.Figure(shown))
-    place = "x and y of its origin and the angle phi of its frame"
-    if _is_in_space(system):
-        place = "x, y and z of its origin and the Euler parameters of its frame"
-        blocks.append(doc.text(*EULER_PARAMETERS))
+    kind = system.ground.kind
+    blocks += orientation_in_words(system)
     blocks.append(
         doc.text(
-            f"The coordinates of a body are {place}; points and directions of bodies are given in "
-            "their frames. The ground is fixed."
+            f"The coordinates of a body are {kind.placed_by}; points and directions of bodies "
+            "are given in their frames. The ground is fixed."
         )
     )
     rows: list[tuple[doc.Run | doc.Runs, ...]] = [
         (doc.Verbatim(body.name), *(doc.Verbatim(name) for name in body.coordinates))
         for body in system.bodies
     ]
-    blocks.append(doc.table(("body", *system.ground.kind.letters), rows))
+    blocks.append(doc.table(("body", *kind.letters), rows))
     return doc.Chapter("mechanism", ("The mechanism",), tuple(blocks))
-
-
-def _is_in_space(system: ConstraintSystem) -> bool:
-    return len(system.ground.kind.axes) == len("xyz")
 
 
 def _symbol(blank: Blank, system: ConstraintSystem) -> fm.Formula:
@@ -104,7 +98,7 @@ def _symbol(blank: Blank, system: ConstraintSystem) -> fm.Formula:
 
 def _tasks(system: ConstraintSystem, blanks: Sequence[Blank]) -> doc.Chapter:
     last = system.bodies[0].coordinates[-1]
-    way = "Euler parameters" if _is_in_space(system) else "sines and cosines"
+    way = system.ground.kind.written_in
     note = doc.text(
         f"Derive each entry in {way}, with the numbers of this page and the names of "
         "the coordinates; the rate of ", doc.Verbatim(last), " is ", doc.Verbatim(rate(last)),

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
-
-from kincompile.model.catalogue import CONSTRAINTS
-from kincompile.model.mechanism import Mechanism
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,9 +14,13 @@ if TYPE_CHECKING:
     from kincompile.model.constraint import Constraint
     from kincompile.model.drawing import Drawing
     from kincompile.model.load import Load
+    from kincompile.model.mechanism import Mechanism
 
 PLANE, SPACE = 2, 3
 """Values of the key `space`."""
+
+ROOMS = {PLANE: "model", SPACE: "space"}
+"""The folder that has the builder, the types and the sketch of each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,32 +48,22 @@ class Dimensions:
 
     def sketch(self) -> type[Drawing[Any]]:
         """Return what draws a mechanism, which only a model with a drawing needs."""
-        if self.count == PLANE:
-            from kincompile.model.sketch import Sketch
-
-            return Sketch
-        from kincompile.space.sketch import Sketch as InSpace
-
-        return InSpace
+        found: type[Drawing[Any]] = _of("sketch", self.count).Sketch
+        return found
 
     def loads(self) -> Mapping[str, type[Load]]:
         """Return the types of loads by name, which only a model that has any needs."""
-        if self.count == PLANE:
-            from kincompile.model.loads import LOADS
-
-            return LOADS
-        from kincompile.space.loads import LOADS as IN_SPACE
-
-        return IN_SPACE
+        found: Mapping[str, type[Load]] = _of("loads", self.count).LOADS
+        return found
 
 
 @cache
 def dimensions(count: int) -> Dimensions:
     """Return the words of a file in the plane, or in space; a planar file loads no spatial code."""
-    if count == PLANE:
-        return Dimensions(Mechanism, CONSTRAINTS)
-    from kincompile.space.catalogue import CONSTRAINTS as IN_SPACE
-    from kincompile.space.mechanism import Mechanism as SpatialMechanism
+    known: Mapping[str, type[Constraint]] = _of("catalogue", count).CONSTRAINTS
+    types = {name: item for name, item in known.items() if not item.is_own}
+    return Dimensions(_of("mechanism", count).Mechanism, types)
 
-    types = {name: item for name, item in IN_SPACE.items() if not item.is_own}
-    return Dimensions(SpatialMechanism, types)
+
+def _of(module: str, count: int) -> Any:
+    return import_module(f"kincompile.{ROOMS[count]}.{module}")

@@ -29,6 +29,9 @@ class BodyKind:
     frame: type[Frame]  # the frame of a body i or j in the calculus, by its index
     units: tuple[str | None, ...]  # unit of each coordinate, None for that of lengths
     drivers: tuple[str, ...]  # name of the constraint type that drives each
+    # What places a body, and what its formulas are written in, in words.
+    placed_by: str
+    written_in: str
     # What to take in place of constraint types of the other kinds of bodies, by their names.
     elsewhere: Mapping[str, str]
     # The module that makes a load of a body's mass; loaded where a body has one.
@@ -57,6 +60,8 @@ PLANAR = BodyKind(
     frame=PlaneFrame,
     units=(None, None, "rad"),
     drivers=("AbsoluteX", "AbsoluteY", "AbsoluteAngle"),
+    placed_by="x and y of its origin and the angle phi of its frame",
+    written_in="sines and cosines",
     elsewhere={
         "Spherical": "Revolute",
         "Cylindrical": "Translational, or RevoluteTranslational",

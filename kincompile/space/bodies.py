@@ -37,6 +37,8 @@ SPATIAL = BodyKind(
     frame=SpatialFrame,
     units=(None, None, None, "", "", "", ""),
     drivers=("AbsoluteX", "AbsoluteY", "AbsoluteZ", *("AbsoluteOrientation",) * 4),
+    placed_by="x, y and z of its origin and the Euler parameters of its frame",
+    written_in="Euler parameters",
     turning=("AbsoluteOrientation", "RelativeRotation", "Spherical", "Universal"),
     elsewhere={
         **{name: f"spatial.{name}" for name in ALIKE},

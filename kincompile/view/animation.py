@@ -16,7 +16,7 @@ from kincompile.view.drawing import drawing
 from kincompile.view.mechanism_plot import axes_of, draw, write_name
 from kincompile.view.svg import Timing, as_svg
 from kincompile.view.traces import described, moving_system, traced_places
-from kincompile.view.worlds import in_space
+from kincompile.view.worlds import in_view
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -233,7 +233,7 @@ def _glb_of(
     if seconds is not None and t.size > 1:
         elapsed *= _playing_time(t, seconds) / elapsed[-1]
     paths = [place.at(q) for place in places]
-    file: bytes = in_space("gltf").as_glb(shapes, elapsed, q, length_unit, paths)
+    file: bytes = in_view("gltf").as_glb(shapes, elapsed, q, length_unit, paths)
     return file
 
 

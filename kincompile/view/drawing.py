@@ -32,7 +32,7 @@ from kincompile.view.marks import (
     shape_of,
 )
 from kincompile.view.shapes import SHAPES
-from kincompile.view.worlds import PLANE, SPACE, dimension_of, drawings_in, tables_in
+from kincompile.view.worlds import PLANE, SPACE, dimension_of, drawn_by
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -112,7 +112,8 @@ class Drawing:
             for mark in self.marks
         ]
         data["overhang"] = OVERHANG * self.size
-        return data | tables_in(self.dimension)
+        looks: dict[str, Any] = drawn_by("looks", self.dimension)()
+        return data | looks
 
 
 def drawing(
@@ -151,7 +152,7 @@ def drawing(
         positions,
     )
     dimension = dimension_of(system)
-    drawings = drawings_in(dimension)
+    drawings = drawn_by("joints", dimension)
     by_joint = {
         joint.name: marks_of(joint.written, JointGeometry(joint, geometry), drawings)
         for joint in joints

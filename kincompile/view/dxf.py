@@ -11,7 +11,7 @@ from kincompile.errors import package_of_extra
 from kincompile.view.marks import GROUND_FRAME, Contour, Polygon
 from kincompile.view.polylines import Polyline, pieces, polylines
 from kincompile.view.shapes import HUES
-from kincompile.view.worlds import in_space
+from kincompile.view.worlds import drawn_by, in_view
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -64,16 +64,16 @@ def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = 
         VERSION, setup=["linetypes"], units=LENGTHS.get(length_unit, (0, 0))[0]
     )
     layers = _layers(document, drawn)
-    add = _add_solids if drawn.is_spatial else _add_strokes
-    add(document.modelspace(), drawn, q, layers, paths)
+    drawn_by("DXF", drawn.dimension)(document.modelspace(), drawn, q, layers, paths)
     text = io.StringIO()
     document.write(text)
     return text.getvalue()
 
 
-def _add_strokes(
+def add_strokes(
     space: Any, drawn: Drawing, q: Array, layers: Sequence[str], paths: Iterable[Array]
 ) -> None:
+    """Add the strokes of a mechanism in the plane."""
     for item in polylines(drawn):
         points = item.at(q)
         if item.stroke.look == "gap" and np.ptp(points, axis=0).max() <= 1e-3 * drawn.size:
@@ -88,10 +88,11 @@ def _add_strokes(
             _add(space, piece, False, 0.0, {"layer": layers[-1]})
 
 
-def _add_solids(
+def add_solids(
     space: Any, drawn: Drawing, q: Array, layers: Sequence[str], paths: Iterable[Array]
 ) -> None:
-    for item, part in in_space("solid_picture").all_parts(drawn, q):
+    """Add the faces and lines of a mechanism in space."""
+    for item, part in in_view("solid_picture").all_parts(drawn, q):
         attributes = {"layer": _layer(item, layers)}
         if part.normal is None:
             space.add_polyline3d(part.points.tolist(), dxfattribs=attributes)

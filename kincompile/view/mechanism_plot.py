@@ -15,7 +15,7 @@ from kincompile.view.drawing import drawing
 from kincompile.view.marks import GROUND_FRAME
 from kincompile.view.polylines import polylines
 from kincompile.view.shapes import GROUND_COLOUR
-from kincompile.view.worlds import PLANE, in_space
+from kincompile.view.worlds import PLANE, PROJECTIONS, drawn_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -159,7 +159,7 @@ def checked_parameters(
 
 def axes_of(figure: Figure, drawn: Drawing) -> Axes:
     """Return the axes of a new figure, those of space where the mechanism moves there."""
-    return figure.add_subplot(projection="3d" if drawn.is_spatial else None)
+    return figure.add_subplot(projection=PROJECTIONS[drawn.dimension])
 
 
 def draw(
@@ -172,16 +172,20 @@ def draw(
 
     The limits of the plot hold all positions, shape (N, n).
     """
-    if drawn.is_spatial:
-        in_axes: Callable[..., Callable[[NDArray[np.float64]], None]]
-        in_axes = in_space("solid_plot").draw_in_space
-        return in_axes(ax, model.system().length_unit, drawn, q)
+    in_axes: Callable[..., Callable[[NDArray[np.float64]], None]]
+    in_axes = drawn_by("plot", drawn.dimension)
+    return in_axes(ax, model.system().length_unit, drawn, q)
+
+
+def draw_in_plane(
+    ax: Axes, unit: str, drawn: Drawing, q: NDArray[np.float64]
+) -> Callable[[NDArray[np.float64]], None]:
+    """Draw a mechanism at the first of positions q, shape (N, n); return what moves it."""
     x_low, x_high, y_low, y_high = drawn.extent(q)
     artists = [
         (polyline, _artist(ax, polyline, q[0], order))
         for order, polyline in enumerate(polylines(drawn))
     ]
-    unit = model.system().length_unit
     ax.set_aspect("equal")
     # Stands and arrows reach up to four sizes beyond their places, of which the extent has two.
     room = 2 * drawn.size

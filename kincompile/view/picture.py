@@ -14,7 +14,7 @@ from kincompile.report.picture import Picture, PictureLabel, PicturePath
 from kincompile.view.marks import GROUND_FRAME, moves_with
 from kincompile.view.polylines import Polyline, of_mark, pieces
 from kincompile.view.shapes import GROUND_COLOUR, HUES
-from kincompile.view.worlds import PLANE, in_space
+from kincompile.view.worlds import PLANE, drawn_by
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -78,9 +78,18 @@ def picture(
         Frames that the picture is about; what moves with others is faint, in space left out. All
         by default.
     """
-    if drawn.is_spatial:
-        seen: Picture = in_space("solid_picture").picture_in_space(drawn, q, title, arrows, focus)
-        return seen
+    made: Picture = drawn_by("picture", drawn.dimension)(drawn, q, title, arrows, focus)
+    return made
+
+
+def picture_in_plane(
+    drawn: Drawing,
+    q: Array,
+    title: str,
+    arrows: Sequence[Arrow],
+    focus: Iterable[BodyFrame] | None,
+) -> Picture:
+    """Draw a mechanism in the plane; `picture` says what is given."""
     left, right, low, high = drawn.extent(q)
     ends = [np.stack((arrow.start, arrow.end)) for arrow in arrows]
     scale = Scale([np.array(((left, low), (right, high))), *ends])

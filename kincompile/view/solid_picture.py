@@ -77,8 +77,8 @@ def picture_in_space(
     drawn: Drawing,
     q: Array,
     title: str,
-    arrows: Sequence[Arrow] = (),
-    focus: Iterable[BodyFrame] | None = None,
+    arrows: Sequence[Arrow],
+    focus: Iterable[BodyFrame] | None,
 ) -> Picture:
     """Draw a mechanism in space; `picture` says what is given."""
     ends = [ISOMETRIC.seen(np.stack((arrow.start, arrow.end)))[:, :2] for arrow in arrows]

@@ -22,7 +22,7 @@ from kincompile.report.templates import read
 from kincompile.view.marks import GROUND_FRAME, moves_with
 from kincompile.view.polylines import Polyline, polylines
 from kincompile.view.shapes import HUES, mixed
-from kincompile.view.worlds import in_space
+from kincompile.view.worlds import drawn_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -135,9 +135,20 @@ def as_svg(
     millimetres
         Length of the model's unit where the picture has its true size, in space across the view.
     """
-    if drawn.is_spatial:
-        svg_in_space: Callable[..., str] = in_space("solid_svg").svg_in_space
-        return svg_in_space(drawn, q, description, paths, timing, millimetres, view)
+    draw: Callable[..., str] = drawn_by("SVG", drawn.dimension)
+    return draw(drawn, q, description, paths, timing, millimetres, view)
+
+
+def svg_in_plane(
+    drawn: Drawing,
+    q: Array,
+    description: str,
+    paths: Sequence[Array],
+    timing: Timing | None,
+    millimetres: float | None,
+    view: str,
+) -> str:
+    """Return a mechanism in the plane, which has one view; `as_svg` says what is given."""
     sheet = _Sheet(drawn, q, paths)
     unit = sheet.scale * drawn.size
     line = max(1.0, unit / THICK)

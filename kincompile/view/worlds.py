@@ -1,22 +1,30 @@
-"""What draws in the plane and in space; that of space is loaded when it is first needed."""
+"""What draws in the plane and in space, as a table; a module is loaded when it is first needed."""
 
 from __future__ import annotations
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from kincompile.view.joint_shapes import DRAWINGS
-from kincompile.view.shapes import tables
-
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from kincompile.model.constraint import Constraint
     from kincompile.model.system import ConstraintSystem
-    from kincompile.view.joint_shapes import DrawJoint
 
 PLANE, SPACE = 2, 3
 """Dimensions of points."""
+
+DRAWN_BY: Mapping[str, Mapping[int, str]] = {
+    "joints": {PLANE: "joint_shapes.DRAWINGS", SPACE: "solid_joints.DRAWINGS"},
+    "looks": {PLANE: "shapes.tables", SPACE: "solid_shapes.solid_tables"},
+    "picture": {PLANE: "picture.picture_in_plane", SPACE: "solid_picture.picture_in_space"},
+    "SVG": {PLANE: "svg.svg_in_plane", SPACE: "solid_svg.svg_in_space"},
+    "DXF": {PLANE: "dxf.add_strokes", SPACE: "dxf.add_solids"},
+    "plot": {PLANE: "mechanism_plot.draw_in_plane", SPACE: "solid_plot.draw_in_space"},
+}
+"""By what is drawn: a module of this folder and its name for it, by the dimension."""
+
+PROJECTIONS: Mapping[int, str | None] = {PLANE: None, SPACE: "3d"}
+"""The projection of matplotlib's axes."""
 
 
 def dimension_of(system: ConstraintSystem) -> int:
@@ -24,22 +32,12 @@ def dimension_of(system: ConstraintSystem) -> int:
     return system.bodies[0].kind.frame.size if system.bodies else PLANE
 
 
-def drawings_in(dimension: int) -> Mapping[type[Constraint], DrawJoint]:
-    """Return the function that draws each type of constraint."""
-    if dimension == PLANE:
-        return DRAWINGS
-    found: Mapping[type[Constraint], DrawJoint] = in_space("solid_joints").DRAWINGS
-    return found
+def drawn_by(what: str, dimension: int) -> Any:
+    """Return the function or the table that draws something in the plane or in space."""
+    module, name = DRAWN_BY[what][dimension].split(".")
+    return getattr(in_view(module), name)
 
 
-def in_space(name: str) -> Any:
-    """Return a module that draws in space: solid_picture, solid_svg, solid_plot or gltf."""
+def in_view(name: str) -> Any:
+    """Return a module of this folder."""
     return import_module(f"kincompile.view.{name}")
-
-
-def tables_in(dimension: int) -> dict[str, Any]:
-    """Return what marks look like as plain data, for a page."""
-    if dimension == PLANE:
-        return tables()
-    found: dict[str, Any] = in_space("solid_shapes").solid_tables()
-    return found

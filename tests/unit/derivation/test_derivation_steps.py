@@ -17,7 +17,7 @@ TITLES = (
     "1. The joint and its attributes", "2. The constraint in vectors", "3. The rules used",
     "4. The blocks of the Jacobian in vectors", "5. The right side of the velocity equation",
     "6. The right side of the acceleration equation, term by term",
-    "7. Expanded to sines and cosines", "8. Placement by row and column offset", "9. In numbers",
+    "7. Written out in sines and cosines", "8. Placement by row and column offset", "9. In numbers",
 )  # fmt: skip
 
 
