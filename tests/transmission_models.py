@@ -62,17 +62,17 @@ def ankle_with_rods():
     return m
 
 
-def five_bar(*, second=0.9, end=(-0.0024, 0.0956)):
+def five_bar(*, first=2.3, second=0.9, end=(-0.0024, 0.0956)):
     """Return T6; without a value its second motor is free."""
     m, rods = kc.Mechanism("five_bar"), []
-    for number, x, turned in ((1, -0.059, 2.3), (2, 0.059, 0.9)):
+    for number, x, turned in ((1, -0.059, first), (2, 0.059, 0.9 if second is None else second)):
         elbow = x + 0.09 * math.cos(turned), 0.09 * math.sin(turned)
         slope = math.atan2(end[1] - elbow[1], end[0] - elbow[0])
         arm = m.body(f"arm_{number}", (x, 0, turned))
         rods.append(m.body(f"rod_{number}", (*elbow, slope)))
         m.add(kc.Revolute(f"M{number}", m.ground, (x, 0), arm, (0, 0)))
         m.add(kc.Revolute(f"E{number}", arm, (0.09, 0), rods[-1], (0, 0)))
-        value = turned if number == 1 else second
+        value = first if number == 1 else second
         if value is not None:
             m.add(kc.AbsoluteAngle(f"motor_{number}", arm, value))
     m.add(kc.Revolute("P", rods[0], (0.12, 0), rods[1], (0.12, 0)))

@@ -30,6 +30,10 @@ CASES = {
     "T6, other side": (
         lambda: models.five_bar(end=(-0.0016, 0.042)), ["motor_1", "motor_2"], ["end"], [3],
     ),
+    "T6, crossed arms": (
+        lambda: models.five_bar(first=0.6, second=2.4, end=(-0.0442, -0.0534)),
+        ["motor_1", "motor_2"], ["end"], [4],
+    ),
     "T7a": (models.differential, *MOTORS, slice(None)),
     "T7b": (models.remote_drive, *MOTORS, slice(None)),
     "T7c": (models.bevel_wrist, *MOTORS, slice(None)),
@@ -133,6 +137,45 @@ def test_that_the_end_of_the_input_is_an_output_singularity():
         assert poses.singularity.tolist() == ["", "output"]
         assert np.isnan(poses.x[1]).all()
         assert np.isnan(poses.J[1]).all()
+
+
+def test_that_a_stretched_arm_is_an_input_singularity():
+    pose = GOLDEN["T6"]["singular"][2]
+    model = models.five_bar(first=0.9, end=(0.05, 0.17))
+    poses = kc.transmission(model, *CASES["T6"][1:3]).at(pose["u"])
+    close(poses.x, np.array(pose["x"]))
+    np.testing.assert_allclose(poses.J, pose["J"], rtol=0, atol=1e-13)
+    assert poses.singularity == "input"
+
+
+def test_that_distal_links_in_one_line_end_both_assemblies():
+    f = kc.transmission(models.five_bar(), *CASES["T6"][1:3])
+    pose = GOLDEN["T6"]["singular"][3]
+    for u, end, sign in zip(pose["u"], pose["x"], (-1, 1), strict=True):
+        poses = f.at([[u[0], u[1] + 1e-6 * sign], [u[0], u[1] - 1e-6 * sign]])
+        assert (poses.status != 0).tolist() == [False, True]
+        np.testing.assert_allclose(poses.x[0], end, rtol=0, atol=2e-4)  # a root of the distance
+        assert 0 < poses.to_output[0] < 2e-6
+        assert poses.singularity[1] == "output"
+
+
+def test_that_the_points_of_the_curve_are_singular_for_the_inverse():
+    """All 22, each on one working mode, in which J^-1 has a kernel: type 2."""
+    points = np.array(GOLDEN["T6"]["singular"][0]["points"])
+    modes = np.zeros(len(points), dtype=int)
+    for mode in GOLDEN["T6"]["inverse"]["solutions"]:
+        model = models.five_bar(first=mode["u"][0], second=mode["u"][1], end=(0.02, 0.15))
+        inverse = kc.transmission(model, *CASES["T6"][1:3]).inverse
+        x = points[:, 2:]
+        first, found = inverse.at(x), np.zeros(len(points), dtype=bool)
+        for poses in (first, inverse.at(x, near=first.pose(0))):  # no straight way leads to one
+            apart = np.remainder(poses.x - points[:, :2] + np.pi, 2 * np.pi) - np.pi
+            here = np.abs(apart).max(axis=1) < 1e-9
+            assert (np.abs(poses.determinant[here]) < 1e-10).all()
+            assert (poses.singularity[here] == "input").all()  # of the inverse
+            found |= here
+        modes += found
+    assert modes.tolist() == [1] * len(points)
 
 
 @pytest.fixture(scope="module")
