@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from kincompile.emitters.target import Emitted
     from kincompile.ir.grouping import GroupedProgram
     from kincompile.ir.program import Program
+    from kincompile.ir.transmission import TransmissionCode
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.engine.code import Compiled, Dynamics, Kind, Place
     from kincompile.structure.report import Inspection
@@ -128,7 +129,7 @@ def emit(
                 "a transmission is a file of its own, written out, without sensitivities and "
                 "equations of motion; leave out what is asked for beside it"
             )
-        return _transmission(system, target, *transmission)
+        return transmission_files(system, target, *transmission)[0]
     with _without_collector(system):
         if form == "grouped" and (sensitivities or dynamics):
             what = "sensitivities" if sensitivities else "equations of motion"
@@ -150,10 +151,18 @@ def emit(
         return with_march(emitted, code.program)
 
 
-def _transmission(
-    system: ConstraintSystem, target: str, inputs: Sequence[str], outputs: Sequence[str]
-) -> Emitted:
-    """Return the files of a mechanism as a function of its inputs."""
+def transmission_files(
+    system: ConstraintSystem,
+    target: str,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    *,
+    is_drawn: bool = False,
+) -> tuple[Emitted, TransmissionCode]:
+    """Return the files of a mechanism as a function of its inputs, and the code in them.
+
+    Its outputs are followed by all coordinates where it is to be drawn.
+    """
     from kincompile.emitters.transmission_emission import emit_transmission, require_transmission
     from kincompile.ir.transmission import transmission_code
     from kincompile.transmissions.loop import loop_of
@@ -170,11 +179,11 @@ def _transmission(
             f"no position of {system.name} was found where a transmission begins, at the values "
             "that its drivers have at t = 0: give a better guess."
         )
-    found = transmission_code(code, names, loop.outputs, q.tolist())
+    drawn = [x.name for x in code.program.coordinates] if is_drawn else []
+    found = transmission_code(code, names, [*loop.outputs, *drawn], q.tolist())
     defaults = {x.name: float(x.default or 0.0) for x in code.program.parameters}
-    return emit_transmission(
-        target, found, [q[k] for k in found.free], [defaults[name] for name in names]
-    )
+    first = [q[k] for k in found.free], [defaults[name] for name in names]
+    return emit_transmission(target, found, *first), found
 
 
 @contextmanager

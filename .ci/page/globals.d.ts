@@ -2,5 +2,6 @@
    kincompile/view/page_scripts.py; a gallery the scripts of each dimension, by gallery.py. */
 declare const emitted: any;
 declare const forces: any;
+declare const transmitted: any;
 declare const geometry: any;
 declare const worlds: any;

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import kincompile as kc
 from kincompile.cli.motion import Motion, motion_options
-from kincompile.cli.shared import NOT_CONVERGED, deg_option, output_option, read_model
+from kincompile.cli.shared import (
+    NOT_CONVERGED,
+    deg_option,
+    output_option,
+    read_model,
+    transmission_option,
+)
 from kincompile.cli.watch import follow
+from kincompile.design.task_tables import read_transmission
 from kincompile.errors import InputError
+from kincompile.files.sweep_table import task_reader
 from kincompile.writing import require_writable
+
+if TYPE_CHECKING:
+    from kincompile.cli.shared import Ends
 
 
 @click.command("view")
@@ -24,6 +35,7 @@ from kincompile.writing import require_writable
     "--watch", is_flag=True, help="Serve the page and reload it whenever the model is saved."
 )
 @motion_options
+@transmission_option("A panel of the mechanism as a function, also by a table [transmission]")
 @deg_option("Show angles in degrees at first; the page can change it.")
 @click.pass_context
 def command(
@@ -32,13 +44,15 @@ def command(
     output: str | None,
     watch: bool,
     motion: Motion,
+    transmission: Ends | None,
     angle_unit: str,
 ) -> None:
     """Write a page that shows MODEL in motion, with plots and numbers.
 
     The page is one file that needs no network: open it in a browser. Of several models, each gets
     a page in a folder, whose index.html links them. Where the motion does not converge, the page
-    shows what was found, or the start guess, and the exit code is 3.
+    shows what was found, or the start guess, and the exit code is 3. With a transmission the page
+    has a panel with sliders of the inputs, and needs no motion.
 
     With --watch the page of one model is shown on this machine alone, at the address that is said,
     until Ctrl-C. It is made anew, by this command, when a file is saved that the model reads; an
@@ -59,8 +73,9 @@ def command(
         "through": motion.through, "assembly": motion.assembly, "angle_unit": angle_unit,
     }  # fmt: skip
     pages = []
-    for model in read:
+    for path, model in zip(models, read, strict=True):
         numbers = motion.numbers(model)
+        options["transmission"] = transmission or _tabled(path)
         pages.append(kc.page(model, t=motion.times(model, numbers), p=numbers, **options))
     written = [pages[0].write(output)] if is_page else kc.gallery(pages).write(output)
     for path in written:
@@ -72,6 +87,14 @@ def command(
         context.exit(NOT_CONVERGED)
 
 
+def _tabled(model: str) -> Ends | None:
+    """Return inputs and outputs of the table [transmission] of a model, None without it."""
+    if task_reader(model, "transmission") is None:
+        return None
+    given = read_transmission(model)
+    return given["inputs"], given["outputs"]
+
+
 def _watch(context: click.Context, models: tuple[str, ...], output: str | None) -> None:
     """Show the page of one model while it is written, with the options of this call."""
     if len(models) > 1 or output is not None:
@@ -80,6 +103,8 @@ def _watch(context: click.Context, models: tuple[str, ...], output: str | None) 
     for item in context.command.params:
         given = context.params[item.name or ""]
         if item.param_type_name == "option" and item.name not in ("output", "watch"):
+            if item.name == "transmission":
+                given = given and ":".join(",".join(names) for names in given)
             every = given if isinstance(given, tuple) else (given,)
             if isinstance(item, click.Option) and item.is_flag:
                 options += [item.opts[-1]] if given == item.flag_value else []

@@ -23,13 +23,14 @@ from kincompile.view.page_scripts import (
     forces_script,
     geometry_script,
     solver_script,
+    transmission_script,
 )
 from kincompile.view.worlds import dimension_of
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from types import ModuleType
 
     from numpy.typing import ArrayLike
@@ -37,14 +38,15 @@ if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
 
-STYLES = ("style.css", "newton.css", "live.css")
+STYLES = ("style.css", "newton.css", "live.css", "transmission.css")
 """Style sheets, in order."""
 
 SCRIPTS = (
     "player.js", "units.js", "draw.js", "stage.js", "poles.js", "forces.js",
     "tools.js", "tip.js", "columns.js",
     "plots.js", "tables.js", "showing.js", "newton.js", "newton_tables.js", "newton_stage.js",
-    "newton_panel.js", "live.js", "measures.js", "grab.js", "start.js",
+    "newton_panel.js", "sliders.js", "live.js", "measures.js", "grab.js",
+    "transmission.js", "transmission_map.js", "transmission_panel.js", "start.js",
 )  # fmt: skip
 """Scripts, in order: each uses those before it, and the emitted module."""
 
@@ -108,6 +110,7 @@ def page(
     through: str | None = None,
     assembly: int | None = None,
     angle_unit: str = "rad",
+    transmission: tuple[Sequence[str], Sequence[str]] | None = None,
 ) -> Page:
     """Return a page that shows a mechanism, its motion and its numbers.
 
@@ -128,6 +131,9 @@ def page(
         Start in this one of the ways to assemble the mechanism, as `kc.solve` does.
     angle_unit : {"rad", "deg"}
         What the page shows angles in, until its reader chooses.
+    transmission
+        Names of inputs and of outputs, as `kc.transmission` takes them: the page has a panel that
+        shows the mechanism as this function, and needs no motion.
 
     Raises
     ------
@@ -135,7 +141,7 @@ def page(
         If the model cannot be used as written; every problem is listed.
     InputError
         If times, parameters or the unit cannot be used, or the solution is of another model, or
-        holds several variants.
+        holds several variants, or inputs and outputs are no transmission.
     """
     shown_unit("rad", angle_unit)
     system = system_of(model)
@@ -150,11 +156,16 @@ def page(
     is_given = assembly is not None or module is None
     shown = page_data(system, solution, message, starts_there=is_given)
     shown["angleUnit"] = angle_unit
+    script, shown["transmission"] = transmission_script(system, transmission)
+    if solution is None and shown["transmission"]:
+        # A function needs no driver: that there is no motion is nothing to complain of.
+        shown |= {"success": True, "message": ""}
     slots = {
         "title": escape(system.name),
         "style": "\n".join(read(f"view/{name}") for name in STYLES),
         "scripts": [
             solver_script(system),
+            script,
             forces_script(system),
             geometry_script(system, shown["drawing"]),
             *(read(f"view/{name}") for name in scripts_for(dimension_of(system))),

@@ -14,9 +14,10 @@ from kincompile.emitters.lines import indented, wrapped
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.schedule import Scheduler
-from kincompile.errors import ModelError, UnsupportedError
+from kincompile.errors import ModelError, StructuralError, UnsupportedError
 from kincompile.ir.graph import Graph
 from kincompile.ir.inline import inline
+from kincompile.report.templates import read
 from kincompile.view.live_numbers import ANGLE, live_places
 
 if TYPE_CHECKING:
@@ -42,19 +43,54 @@ def solver_script(model: Mechanism | ConstraintSystem) -> str:
     """Return the script that declares `emitted`: the module, or `reason`, why there is none."""
     count = len(model.system().coordinates)
     if count > MOST_COORDINATES:
-        return _without(f"{count} coordinates are too many for a page.")
+        return _without("emitted", f"{count} coordinates are too many for a page.")
     try:
         emitted = compiler.emit(model, "javascript")
     except UnsupportedError as error:
-        return _without(str(error))
+        return _without("emitted", str(error))
     if emitted.unsolvable:
-        return _without(emitted.unsolvable)
+        return _without("emitted", emitted.unsolvable)
     # In a function of its own, so that no name of a mechanism meets one of the page.
     return (
         f"const emitted = (() => {{\nconst module = {{ exports: {{}} }};\n{emitted.source}"
         f"return module.exports.solver ? module.exports : {json.dumps({'reason': DEPENDENT})};\n"
         "})();\n"
     )
+
+
+def transmission_script(
+    model: Mechanism | ConstraintSystem, ends: tuple[Sequence[str], Sequence[str]] | None
+) -> tuple[str, dict[str, list[dict[str, str]]] | None]:
+    """Return the script that declares `transmitted`, and names and units of inputs and outputs.
+
+    It is null without a transmission, and has a `reason` where the mechanism has none as code. The
+    outputs of its function are followed by all coordinates, which the drawing needs.
+
+    Raises
+    ------
+    InputError
+        As `kc.emit` with a transmission.
+    """
+    if ends is None:
+        return "const transmitted = null;\n", None
+    try:
+        emitted, code = compiler.transmission_files(
+            model.system(), "javascript", *ends, is_drawn=True
+        )
+    except (StructuralError, UnsupportedError) as error:
+        return _without("transmitted", str(error)), {"inputs": [], "outputs": []}
+    count = len(code.outputs) - len(model.system().coordinates)
+    names = {"inputs": code.titles, "outputs": code.outputs[:count]}
+    script = (
+        f"const transmitted = (() => {{\nconst module = {{ exports: {{}} }};\n"
+        f"const norm = vector => Math.hypot(...vector), largest = vector => norm(vector);\n"
+        f"{read('javascript/linear.js')}\n{emitted.source}"
+        "return { ...module.exports, factor, singularValues };\n})();\n"
+    )
+    return script, {
+        key: [{"name": name, "unit": code.units[name]} for name in own]
+        for key, own in names.items()
+    }
 
 
 def forces_script(model: Mechanism | ConstraintSystem) -> str:
@@ -132,5 +168,5 @@ def function_text(
     return f"function {name}({ANGLE}, p) {{\n{indented(lines)}\n}}\n"
 
 
-def _without(reason: str) -> str:
-    return f"const emitted = {json.dumps({'reason': reason})};\n".replace("<", "\\u003c")
+def _without(name: str, reason: str) -> str:
+    return f"const {name} = {json.dumps({'reason': reason})};\n".replace("<", "\\u003c")

@@ -161,7 +161,7 @@ function drawShapes(ctx, q, style) {
    them for the motion that the page was given (kincompile/view/geometry.py). */
 function fitMarks(motion) {
   const { marks, overhang } = motion.data.drawing;
-  const states = motion.states.map(state => state.q);
+  const states = motion.seen.map(state => state.q);
   const least = (values, from) => values.reduce((a, b) => Math.min(a, b), from);
   for (const mark of marks) {
     if (mark.kind === 'span' && mark.style === 'cylinder') {

@@ -74,7 +74,7 @@ const reactions = {
   },
 
   draw(ctx, view, palette, state) {
-    if (!this.isShown || !this.joints.length || !state.isFound) return;
+    if (!this.isShown || !this.joints.length || !state.isFound || state.pose) return;
     const most = this.largest(), values = this.at(state);
     if (!(most > 0)) return;
     const pen = new Pen(ctx, state.q, { view, palette }, player.data.drawing.size);

@@ -12,7 +12,7 @@ class Grab {
   }
 
   down(place, event) {
-    if (!hasMotion() || player.count < 2 || !player.state.isFound) return false;
+    if (!hasMotion() || player.count < 2 || !player.state.isFound || player.state.pose) return false;
     const frame = stage.bodyAt([event.offsetX, event.offsetY])?.frame;
     if (!frame || stage.fingers.size > 1 || event.button > 0) return false;
     const held = heldAt(player.state.q, frame, place, stage.view);

@@ -33,9 +33,8 @@ function setNumbers(drawing, p) {
 
 /* Make rails, barrels and the sizes of marks fit a motion; returns its extent. */
 function fitDrawing(drawing, motion) {
-  const positions = [];
-  for (let k = 0; k < motion.count; k++) if (motion.isFound(k)) positions.push(motion.row('q', k));
-  if (!positions.length) positions.push(motion.solved(0).q);
+  const found = motion.seen.filter(({ isFound }) => isFound);
+  const positions = (found.length ? found : motion.states.slice(0, 1)).map(({ q }) => q);
   drawing.overhang = 0;
   fitMarks(motion);
   const box = boxOf(drawing.marks, positions);
@@ -176,7 +175,8 @@ const live = {
     }
     const grid = document.createElement('div');
     grid.className = 'sliders';
-    this.rows = parameters.map((parameter, k) => this.row(grid, parameter, k));
+    this.sliders = parameters.map((parameter, k) => new Slider(
+      grid, `slider-${k}`, parameter, value => this.pull(k, value), () => this.writeFragment()));
     this.verdict = document.createElement('output');
     panel.append(grid, this.buttons(), this.verdict);
     const { arrays, status, events, success, message, guessResidual } = player.data;
@@ -187,37 +187,6 @@ const live = {
     this.readFragment();
     setTimeout(() => this.motionNow(), REST);  // the first pull is not the first solve: that takes longer
     addEventListener('hashchange', () => this.readFragment());
-  },
-
-  /* A slider with a box beside it. */
-  row(grid, { name, unit, low, high }, k) {
-    const label = document.createElement('label');
-    label.htmlFor = `slider-${k}`;
-    const slider = document.createElement('input');
-    const step = 10 ** Math.floor(Math.log10((high - low) / 200));
-    Object.assign(slider, { type: 'range', id: `slider-${k}`, min: low, max: high, step: 'any' });
-    const box = document.createElement('input');
-    box.type = 'number';
-    slider.addEventListener('input', () => this.pull(k, +Number(slider.value).toPrecision(6)));
-    slider.addEventListener('keydown', event => this.byKey(event, k, step));
-    box.addEventListener('input', () => { if (box.value !== '') this.pull(k, box.valueAsNumber / units.factor(unit)); });
-    for (const element of [slider, box]) element.addEventListener('change', () => this.writeFragment());
-    const row = document.createElement('div');
-    row.append(label, slider, box);
-    grid.append(row);
-    return { slider, box, label, step };
-  },
-
-  /* Arrows move a slider by a two-hundredth of its way; a slider of any step has none of its own. */
-  byKey(event, k, step) {
-    const way = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
-    if (!way) return;
-    event.preventDefault();
-    event.stopPropagation();
-    const { low, high } = player.data.parameters[k];
-    const value = Math.round(this.values[k] / step + way * (event.shiftKey ? 10 : 1)) * step;
-    this.pull(k, +Math.max(low, Math.min(high, value)).toPrecision(12));
-    this.writeFragment();
   },
 
   buttons() {
@@ -250,7 +219,6 @@ const live = {
   },
 
   pull(k, value) {
-    if (!Number.isFinite(value)) return;
     this.set({ [this.names[k]]: value });
   },
 
@@ -270,14 +238,7 @@ const live = {
   },
 
   showValues() {
-    this.rows?.forEach(({ slider, box, label, step }, k) => {
-      const { name, unit } = player.data.parameters[k], factor = units.factor(unit), shown = units.name(unit);
-      label.textContent = units.titled(name, unit);
-      Object.assign(box, { step: factor === 1 ? step : 'any', ariaLabel: shown ? `${name} in ${shown}` : name });
-      slider.value = this.values[k];
-      if (document.activeElement !== box) box.value = +(factor * this.values[k]).toPrecision(6);
-      slider.setAttribute('aria-valuetext', `${box.value} ${shown}`.trim());
-    });
+    this.sliders?.forEach((slider, k) => slider.show(this.values[k]));
   },
 
   /* Solve over the page's own times, and show what comes out. */

@@ -282,7 +282,7 @@ function drawGrid(pen, step) {
 function bodyTip({ name, frame }, state) {
   const [, , phi] = frame.columns, unit = player.data.coordinates[phi].unit;
   const lines = [tipLine(`φ = ${units.full(state.q[phi], unit)}`)];
-  if (state.isFound) {
+  if (state.isFound && !state.pose) {
     lines.push(tipLine(`ω = ${units.full(state.q_dot[phi], `${unit}/s`)}`, 'velocity'));
     lines.push(tipLine(`α = ${units.full(state.q_ddot[phi], `${unit}/s²`)}`, 'acceleration'));
   }

@@ -35,6 +35,7 @@ class Player {
     this.isPlaying = false;
     this.motionListeners = [];
     this.kept = null;
+    this.more = [];
     this.speed = this.pleasantSpeed();
     this.state = this.solved(0);
   }
@@ -66,6 +67,11 @@ class Player {
   get states() {
     this.kept ??= Array.from({ length: this.count }, (_, k) => this.solved(k));
     return this.kept;
+  }
+
+  /* What a drawing has room for: the motion, and further states that are shown, as poses of a transmission. */
+  get seen() {
+    return [...this.states, ...this.more];
   }
 
   /* The state between solved times: Hermite's cubic through positions and velocities. */

@@ -109,7 +109,7 @@ const orbit = {
   /* Find how far this motion and the first one go from the middle of the extent. */
   measured() {
     const { drawing: { marks, size }, extent } = player.data, axes = axesSeenFrom(this.fitted).slice(0, 2);
-    const own = { marks, states: player.states, size };
+    const own = { marks, states: player.seen, size };
     this.first ??= { ...own, marks: structuredClone(marks) };
     this.spans ??= spansOf(this.first, axes);
     const spans = spansOf(own, axes), middle = middleOfExtent(extent);
@@ -581,7 +581,7 @@ function bodyTip({ name, frame }, state) {
   const lines = [
     tipLine(`r = ${written(originOf(state.q, frame), unit)} ${unit}`), tipLine(`p = ${written(p, '')}`),
   ];
-  if (state.isFound) {
+  if (state.isFound && !state.pose) {
     for (const [sign, rates, kind, own] of [['ω', 'q_dot', 'velocity', 'rad/s'], ['α', 'q_ddot', 'acceleration', 'rad/s²']]) {
       const spin = turningOf(p, parametersOf(state[rates], frame)), scale = Math.hypot(...spin);
       const text = spin.map(value => units.text(value, own, scale)).join(', ');

@@ -48,10 +48,14 @@ const UNASSEMBLED = 'No position was found: with these values the mechanism cann
 
 function showNote(state) {
   const note = byId('note'), { status, sentences } = player.data;
-  const isGood = status[state.index] === 0;
+  const isGood = state.pose ? state.isFound : status[state.index] === 0;
   note.hidden = isGood;
   if (isGood) return;
   const shown = state.isFound ? '' : ' Shown is the last position that was found.';
+  if (state.pose) {
+    note.textContent = transmission.sentence();
+    return;
+  }
   // The event that ended the motion, rather than the status alone.
   const [ended] = player.data.events.slice(-1), sentence = sentences[status[state.index]];
   const said = status[state.index] === 4 && ended ? `${splitSentence(sentence)[0]}, after ${inShort(ended)}.` : sentence;
@@ -94,7 +98,7 @@ function connectTransport() {
 
 function showTransport(state) {
   byId('time').value = state.index;
-  byId('clock').textContent = `t = ${units.full(state.time, 's')}`;
+  byId('clock').textContent = state.pose ? 'at the inputs' : `t = ${units.full(state.time, 's')}`;
   byId('speed').value = player.speed;
   const isPlaying = player.isPlaying;
   byId('play').textContent = isPlaying ? '❚❚' : '▶';
@@ -165,6 +169,7 @@ const panels = {
   numbers: () => numbers.update(player.state),
   points: () => points.update(player.state),
   measures: () => measures.show(),
+  transmission: () => transmission.isOpen && transmission.show(),
   newton: () => {},  // follows the player by itself
 };
 let shownPanel = 'plots';
@@ -176,8 +181,10 @@ function showPanel(name) {
     byId(`tab-${other}`).setAttribute('aria-selected', String(other === name));
     byId(`tab-${other}`).tabIndex = other === name ? 0 : -1;
   }
+  // A pose is shown beside its panel only, as are Newton's iterates.
+  if (player.state.pose && name !== 'transmission') player.setIndex(player.state.index);
   panels[name]();
-  player.refresh();  // the stage shows Newton's iterates beside their panel only
+  player.refresh();
 }
 
 function connectTabs() {
@@ -221,7 +228,6 @@ function start() {
   markTimeline();
   connectTransport();
   connectKeys();
-  connectTabs();
   showing.connect();
   plots.build(byId('panel-plots'));
   numbers.build(byId('panel-numbers'));
@@ -246,7 +252,9 @@ function start() {
     showing.layOut();
   }).observe(byId('left'));
   player.onMotion(forget);
-  showPanel('plots');
+  transmission.build(byId('panel-transmission'));
+  connectTabs();
+  showPanel(transmission.branch ? 'transmission' : 'plots');
   showing.theme();
   if (player.data.angleUnit !== units.angle) showing.angles();
 }

@@ -30,7 +30,7 @@ function pointTip(point, state) {
   const here = stage.together(point, state);
   const names = here.map(({ name, kind }) => tipLine(`${name}: ${kind}`));
   const lines = [tipLine(`${AXES.map((axis, k) => `${axis} = ${units.text(place[k], unit)}`).join(', ')} ${unit}`)];
-  if (state.isFound) {
+  if (state.isFound && !state.pose) {
     const rates = ratesInWorld(state, point.frame, point.point);
     for (const [sign, kind, per] of [['v', 'velocity', '/s'], ['a', 'acceleration', '/s²']]) {
       const own = unit + per, parts = rates[kind].map(part => units.text(part, own)).join(', ');

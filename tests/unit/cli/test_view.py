@@ -88,3 +88,53 @@ def test_that_a_page_is_not_written_under_the_name_of_something_else(pendulum, t
     with pytest.raises(kc.InputError, match=r"cannot write .*page\.png: end its name in \.html"):
         page.write(tmp_path / "page.png")
     assert not (tmp_path / "page.png").exists()
+
+
+FREE = (
+    "import kincompile as kc\n"
+    'm = kc.Mechanism("free")\n'
+    'bob = m.body("bob", guess=(1, 0, 0.5))\n'
+    'm.add(kc.Revolute("pin", bob, (-1, 0), m.ground, (0, 0)))\n'
+)
+
+
+def test_that_a_transmission_has_a_page_without_a_driver(kincompile, tmp_path):
+    model, page = tmp_path / "free.py", tmp_path / "page.html"
+    model.write_text(FREE)
+    done = kincompile("view", model, "--transmission", "bob.phi:bob.x,bob.y", "-o", page)
+    assert (done.exit_code, done.stderr) == (0, f"Wrote {page}\n")
+    html = page.read_text(encoding="utf-8")
+    assert '"inputs":[{"name":"phi_bob","unit":"rad"}]' in html
+    assert '"outputs":[{"name":"x_bob","unit":"m"},{"name":"y_bob","unit":"m"}]' in html
+    assert "const free_transmission = " in html
+    done = kincompile("view", model, "--transmission", "bob.phi:bob.z", "-o", page)
+    assert done.exit_code == 2
+    assert "free has no coordinate, output or point 'bob.z'" in done.stderr
+    done = kincompile("view", model, "--transmission", "bob.phi", "-o", page)
+    assert "--transmission bob.phi is not of the form INPUTS:OUTPUTS" in done.stderr
+
+
+def test_that_the_table_of_a_file_names_the_transmission_of_its_page(kincompile, tmp_path):
+    model, page = tmp_path / "free.toml", tmp_path / "page.html"
+    scope: dict[str, kc.Mechanism] = {}
+    exec(FREE, scope)
+    table = '\n[transmission]\ninputs = ["bob.phi"]\noutputs = ["bob.x"]\n'
+    model.write_text(scope["m"].to_toml() + table)
+    assert kincompile("view", model, "-o", page).exit_code == 0
+    assert '"outputs":[{"name":"x_bob","unit":"m"}]' in page.read_text(encoding="utf-8")
+    given = ("--transmission", "bob.phi:bob.y")
+    assert kincompile("view", model, *given, "-o", page).exit_code == 0
+    assert '"outputs":[{"name":"y_bob","unit":"m"}]' in page.read_text(encoding="utf-8")
+
+
+def test_that_watching_passes_the_options_of_its_call_on(kincompile, pendulum, monkeypatch):
+    given = []
+    monkeypatch.setattr("kincompile.cli.view.follow", lambda *call: given.append(call))
+    options = ("--set", "length=2", "--set", "omega=3", "--transmission", "a, b:c", "--deg")
+    assert kincompile("view", pendulum, "--watch", *options).exit_code == 0
+    ((model, passed),) = given
+    assert model == str(pendulum)
+    assert sorted(passed) == ["--deg", "--set=length=2", "--set=omega=3", "--transmission=a,b:c"]
+    given.clear()
+    assert kincompile("view", pendulum, "--watch").exit_code == 0
+    assert given[0][1] == []

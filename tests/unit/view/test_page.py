@@ -206,6 +206,15 @@ def test_that_every_script_and_style_sheet_is_used():
     assert "EventSource" not in kc.page(pendulum()).html
 
 
+def test_that_a_page_says_why_a_mechanism_is_no_function_as_code(example_named):
+    model = example_named("cam_by_table").model
+    page = kc.page(model, transmission=(["motor"], ["follower.y"]))
+    assert page.success
+    (reason,) = re.findall(r'const transmitted = \{"reason": "(.*?)"\};', page.html)
+    assert "has a spline, which a transmission in 'javascript' cannot have" in reason
+    assert "const transmitted = null;" in kc.page(pendulum()).html
+
+
 def test_that_a_page_shows_itself_in_a_frame_of_a_notebook():
     page = kc.page(pendulum())
     frame = page._repr_html_()

@@ -25,7 +25,7 @@ const drawn = pens.map(pen => drawing.marks.flatMap(
 const owners = drawing.marks.flatMap(
   mark => drawing.shapes[mark.shape].map(stroke => ownerOf(mark, stroke.on).index));
 for (const mark of drawing.marks) Object.assign(mark, { barrel: 0, reach: [0, 0] });
-fitMarks({ data: { drawing }, states: positions.map(q => ({ q })) });
+fitMarks({ data: { drawing }, seen: positions.map(q => ({ q })) });
 const fitted = drawing.marks.map(({ barrel, reach }) => [barrel, reach]);
 console.log(JSON.stringify({ drawn, owners, fitted }));
 """

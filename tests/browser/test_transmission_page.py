@@ -1,0 +1,289 @@
+"""The panel of a transmission in Chromium: poses, J, limits, singularities, against Python."""
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kincompile as kc
+from kincompile.functions.limits import limits
+from tests import transmission_models as models
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+GOLDEN = json.loads(
+    (Path(__file__).resolve().parents[1] / "data" / "transmission_golden.json").read_text()
+)
+
+
+def lever() -> kc.Mechanism:
+    """Return T1b, whose input is limited at both ends."""
+    lengths = [GOLDEN["T1b"]["parameters"][x] for x in "abcd"]
+    return models.crank_rocker(*lengths, psi=0.99, motor=1.0)
+
+
+CASES = {
+    "crank_rocker": (models.crank_rocker, ["motor"], ["phi_rocker"]),
+    "free_crank": (lambda: models.crank_rocker(motor=None), ["crank.phi"], ["rocker.phi"]),
+    "lever": (lever, ["motor"], ["phi_rocker"]),
+    "five_bar": (models.five_bar, ["motor_1", "motor_2"], ["end"]),
+    "ankle": (models.ankle, ["left", "right"], ["pitch", "roll"]),
+}
+SEEN = "stage.canvas.toDataURL()"
+SET = """u => new Promise(done => { transmission.set(u);
+  requestAnimationFrame(() => setTimeout(done)); })"""
+
+
+@pytest.fixture(scope="module")
+def open_case(
+    open_file: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory
+) -> Callable[..., Any]:
+    """Return a function that opens the page of a case, whose map is found."""
+    folder = tmp_path_factory.mktemp("pages")
+
+    def opened(case: str, width: int = 1280, scheme: str = "light") -> Any:
+        build, *ends = CASES[case]
+        path = folder / f"{case}.html"
+        if not path.exists():
+            kc.page(build(), transmission=tuple(ends)).write(path)
+        page = open_file(path, width, scheme)
+        page.wait_for_function("transmission.map !== null")
+        return page
+
+    return opened
+
+
+def function_of(case: str) -> kc.Transmission:
+    build, *ends = CASES[case]
+    return kc.transmission(build(), *ends)
+
+
+def poses_of(case: str) -> list[list[float]]:
+    """Return inputs that are reached, some of them far from the first."""
+    return {
+        "crank_rocker": [[0.3], [2.9], [4.4], [-1.0]],
+        "free_crank": [[1.1], [3.2]],
+        "lever": [[0.5], [2.1]],
+        "five_bar": [[2.2, 1.0], [1.2, 1.5], [0.4, 2.6]],
+        "ankle": [[0.21, 0.235], [0.25, 0.24], [0.2, 0.195]],
+    }[case]
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_that_inputs_show_the_pose_and_the_jacobian_of_python(
+    open_case: Callable[..., Any], case: str
+) -> None:
+    page, f = open_case(case), function_of(case)
+    for u in [f.home.u.tolist(), *poses_of(case)]:
+        page.evaluate(SET, u)
+        found, poses = page.evaluate("transmission.found"), f.at(u)
+        assert found["status"] == 0
+        np.testing.assert_allclose(found["x"], poses.x, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(found["J"], poses.J, rtol=0, atol=1e-9 * np.abs(poses.J).max())
+        # The drawing is that of all coordinates.
+        drawn = page.evaluate("Array.from(player.state.q)")
+        np.testing.assert_allclose(drawn, poses.q, rtol=0, atol=1e-9)
+        shown = page.locator(".jacobian tbody tr").first.locator("td").first.inner_text()
+        assert float(shown.split()[0]) == pytest.approx(poses.J[0, 0], rel=1e-6)
+    assert page.said == []
+    assert [url for url in page.asked if not url.startswith("data:")] == [page.url.split("#")[0]]
+    page.close()
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_that_the_first_pose_again_is_the_first_drawing(
+    open_case: Callable[..., Any], case: str
+) -> None:
+    page = open_case(case)
+    first = page.evaluate(SEEN)
+    page.locator("#input-0").focus()
+    for _ in range(3):
+        page.keyboard.press("PageUp")
+    page.wait_for_function("transmission.frame === null")
+    assert page.evaluate(SEEN) != first
+    page.get_by_role("button", name="First pose").click()
+    page.wait_for_function("transmission.frame === null")
+    assert page.evaluate(SEEN) == first
+    page.get_by_role("tab", name="Plots").click()
+    page.get_by_role("tab", name="Transmission").click()
+    assert page.evaluate("player.state.pose.status") == 0
+    assert page.evaluate(SEEN) == first
+    page.close()
+
+
+def test_that_an_input_beyond_its_limit_says_so(open_case: Callable[..., Any]) -> None:
+    page, f = open_case("ankle"), function_of("ankle")
+    left = limits(f, f.home)[0]
+    assert left.high.kind == "lock-up"
+    assert f"left goes from {left.low.value:.6g} to {left.high.value:.6g} m" in page.inner_text(
+        "#panel-transmission output"
+    )
+    before = page.evaluate("Array.from(player.state.q)")
+    page.get_by_label("left in m").fill("0.3")
+    page.wait_for_function("transmission.frame === null && transmission.u[0] === 0.3")
+    said = page.inner_text("#panel-transmission output")
+    assert said.startswith("left = 0.3 m, right = 0.2251 m cannot be reached: the limit of left is")
+    assert f"left = {left.high.value:.6g} m" in said
+    assert "an output singularity (type 2)" in said
+    assert page.inner_text("#note") == said
+    assert page.locator("#panel-transmission .failed").count() == 1
+    # The drawing stays, dimmed, and no number of another pose is shown.
+    assert page.evaluate("Array.from(player.state.q)") == before
+    assert page.evaluate("player.state.isFound") is False
+    shown = "".join(page.locator(".readouts td").all_inner_texts())
+    assert shown
+    assert not any(letter.isalnum() for letter in shown)
+    page.get_by_role("button", name="First pose").click()
+    page.wait_for_function("player.state.isFound")
+    assert page.locator("#note").is_hidden()
+    page.close()
+
+
+def curves(page: Any, kind: str) -> list[Any]:
+    """Return the poses of all curves of a kind."""
+    code = "kind => transmission.map.curves.filter(({ type }) => type === kind).map(c => c.ends)"
+    found: list[Any] = page.evaluate(
+        f"kind => ({code})(kind).map(ends => ends.map(({{ u, all }}) => [u, Array.from(all)]))",
+        kind,
+    )
+    return found
+
+
+def test_that_dead_points_of_a_crank_rocker_are_where_the_closed_form_has_them(
+    open_case: Callable[..., Any],
+) -> None:
+    a, b, c, d = (GOLDEN["T1a"]["parameters"][x] for x in "abcd")
+    straight, folded = (
+        math.acos((side**2 + d**2 - c**2) / (2 * side * d)) for side in (b + a, b - a)
+    )
+    for case in ("crank_rocker", "free_crank"):
+        page = open_case(case)
+        found = sorted(pose[0][0] for (pose,) in curves(page, "input"))
+        assert found == pytest.approx([straight, math.pi + folded], abs=1e-9)
+        assert curves(page, "output") == []
+        assert page.locator(".singular button").all_inner_texts() == [
+            f"input singularity: {'motor' if case == 'crank_rocker' else 'phi_crank'} = {u:.6g} rad"
+            for u in found
+        ]
+        page.close()
+
+
+def test_that_the_ends_of_a_limited_lever_are_where_the_closed_form_has_them(
+    open_case: Callable[..., Any],
+) -> None:
+    a, b, c, d = (GOLDEN["T1b"]["parameters"][x] for x in "abcd")
+    ends = [math.acos((a**2 + d**2 - far**2) / (2 * a * d)) for far in (b - c, b + c)]
+    page = open_case("lever")
+    found = sorted(pose[0][0] for (pose,) in curves(page, "output"))
+    assert found == pytest.approx(ends, abs=1e-6)
+    assert curves(page, "input") == []
+    button = page.get_by_role("button", name="output singularity").first
+    button.click()  # it is reached as nearly as can be
+    page.wait_for_function("transmission.frame === null")
+    assert page.evaluate("Math.abs(transmission.pose.J[0][0])") > 100
+    page.close()
+
+
+def test_that_singular_curves_of_a_five_bar_are_where_its_links_are_in_line(
+    open_case: Callable[..., Any],
+) -> None:
+    page = open_case("five_bar")
+    columns = page.evaluate("player.data.coordinates.map(({ name }) => name)")
+    arms, rods = ([columns.index(f"phi_{kind}_{k}") for k in (1, 2)] for kind in ("arm", "rod"))
+    poses = np.array([pose[1] for curve in curves(page, "input") for pose in curve])
+    assert len(poses) > 100
+    across = np.sin(poses[:, arms] - poses[:, rods])
+    assert np.abs(across).min(axis=1).max() < 1e-7
+    ends = np.array([pose[0] for curve in curves(page, "output") for pose in curve])
+    assert len(ends) > 60
+    elbows = [(-0.059, 0), (0.059, 0)] + 0.09 * np.stack((np.cos(ends), np.sin(ends)), axis=-1)
+    apart = np.linalg.norm(elbows[:, 0] - elbows[:, 1], axis=-1)
+    # Rods outstretched, or the elbows together.
+    assert np.minimum(np.abs(apart - 0.24), apart).max() < 1e-6
+    page.close()
+
+
+def test_that_the_point_is_dragged_in_the_map(open_case: Callable[..., Any]) -> None:
+    page, f = open_case("ankle"), function_of("ankle")
+    page.locator(".map").scroll_into_view_if_needed()
+    box, dot = page.locator(".map").bounding_box(), page.locator(".map .dot").bounding_box()
+    x, y = dot["x"] + dot["width"] / 2, dot["y"] + dot["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 0.1 * box["width"], y - 0.05 * box["height"], steps=4)
+    page.mouse.up()
+    page.wait_for_function("transmission.frame === null && transmission.u[0] > 0.23")
+    u = page.evaluate("transmission.u")
+    assert u[1] > f.home.u[1]
+    np.testing.assert_allclose(page.evaluate("transmission.found.x"), f(u), atol=1e-9)
+    again = page.locator(".map .dot").bounding_box()
+    assert again["x"] + again["width"] / 2 == pytest.approx(x + 0.1 * box["width"], abs=1)
+    assert float(page.get_by_label("left in m").input_value()) == pytest.approx(u[0], rel=1e-5)
+    page.close()
+
+
+def test_that_parameters_that_are_pulled_change_the_function(
+    open_case: Callable[..., Any],
+) -> None:
+    page, f = open_case("crank_rocker"), function_of("crank_rocker")
+    page.evaluate(SET, [2.0])
+    page.evaluate("live.set({ a: 0.035, c: 0.09 })")
+    page.wait_for_function("transmission.branch.p[0] === 0.035 && transmission.map !== null")
+    p = {"a": 0.035, "c": 0.09}
+    np.testing.assert_allclose(page.evaluate("transmission.found.x"), f([2.0], p), atol=1e-9)
+    np.testing.assert_allclose(page.evaluate("transmission.found.J"), f.J([2.0], p), atol=1e-9)
+    assert page.evaluate("player.state.pose.u") == [2.0]
+    b, d = 0.12, 0.13
+    straight = math.acos(((b + 0.035) ** 2 + d**2 - 0.09**2) / (2 * (b + 0.035) * d))
+    assert min(pose[0][0] for (pose,) in curves(page, "input")) == pytest.approx(straight, abs=1e-9)
+    page.evaluate("live.set({ a: 0.2 })")  # no assembly has these lengths
+    page.wait_for_function("transmission.branch.p[0] === 0.2")
+    assert "no pose was found at the first inputs" in page.inner_text("#panel-transmission output")
+    page.get_by_role("button", name="Reset").click()
+    page.wait_for_function("transmission.branch.p[0] === 0.04 && player.state.isFound")
+    np.testing.assert_allclose(page.evaluate("transmission.found.x"), f([2.0]), atol=1e-9)
+    assert page.said == []
+    page.close()
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (820, "dark"), (1440, "light")])
+def test_that_the_panel_fits_and_is_read_aloud(
+    open_case: Callable[..., Any], width: int, scheme: str
+) -> None:
+    page = open_case("ankle", width, scheme)
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert page.get_by_role("tab", name="Transmission").get_attribute("aria-selected") == "true"
+    label = page.get_by_role("img", name="Plane of the inputs: left = 0.2251 m").get_attribute(
+        "aria-label"
+    )
+    assert "output singularities" in label
+    assert "no input singularities" in label
+    slider = page.get_by_label("left [m]")
+    assert slider.get_attribute("aria-valuetext") == "0.2251 m"
+    assert page.get_by_role("status").filter(has_text="left goes from").count() == 1
+    if width < 961:
+        heights = page.locator("#panel-transmission :is(button, input)").evaluate_all(
+            "elements => elements.map(x => x.offsetHeight)"
+        )
+        assert min(heights) >= 44
+    page.evaluate("document.getElementById('angles').click()")
+    assert "pitch [deg]" in page.inner_text(".outputs")
+    page.close()
+
+
+def test_that_time_shows_the_motion_again(open_case: Callable[..., Any]) -> None:
+    page = open_case("lever")
+    page.evaluate(SET, [2.0])
+    assert page.inner_text("#clock") == "at the inputs"
+    page.evaluate("player.setIndex(5)")
+    assert page.inner_text("#clock").startswith("t = ")
+    assert page.evaluate("player.state.q[2]") == pytest.approx(1.0)
+    page.evaluate(SET, [1.5])
+    assert page.evaluate("player.state.q[2]") == pytest.approx(1.5)
+    page.get_by_role("tab", name="Numbers").click()
+    assert page.evaluate("player.state.q[2]") == pytest.approx(1.0)
+    page.close()
