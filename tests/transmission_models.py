@@ -65,7 +65,8 @@ def ankle_with_rods():
 def five_bar(*, first=2.3, second=0.9, end=(-0.0024, 0.0956)):
     """Return T6; without a value its second motor is free."""
     m, rods = kc.Mechanism("five_bar"), []
-    for number, x, turned in ((1, -0.059, first), (2, 0.059, 0.9 if second is None else second)):
+    places = [0.9 if x is None else float(sympy.sympify(x).subs(kc.t, 0)) for x in (first, second)]
+    for number, x, turned in ((1, -0.059, places[0]), (2, 0.059, places[1])):
         elbow = x + 0.09 * math.cos(turned), 0.09 * math.sin(turned)
         slope = math.atan2(end[1] - elbow[1], end[0] - elbow[0])
         arm = m.body(f"arm_{number}", (x, 0, turned))
