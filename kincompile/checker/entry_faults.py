@@ -32,27 +32,43 @@ MOST_EXPANDED = 1000
 
 
 class TypedEntry:
-    """One entry with its faults, which show there and nowhere else."""
+    """One entry with its faults, which show there and nowhere else.
+
+    Attributes
+    ----------
+    entry
+        The right formula as it is typed, a sum of products where that is not too long.
+    """
 
     def __init__(
         self, reference: Reference, quantity: str, row: int, column: int, states: States
     ) -> None:
         self._reference, self._quantity, self._states = reference, quantity, states
-        self._derived = self._entry = reference.expression(quantity, row, column)
+        self._derived = self.entry = reference.expression(quantity, row, column)
         if _count(self._derived) <= MOST_EXPANDED:
-            self._entry = _multiplied_out(self._derived)
+            self.entry = _multiplied_out(self._derived)
 
     @cached_property
     def slips(self) -> Slips:
         """What may stand in the place of its products, besides the usual faults."""
-        is_short = len(sympy.Add.make_args(self._entry)) <= MOST_TERMS
-        forms = dict.fromkeys((self._derived, self._entry) if is_short else (self._derived,))
+        is_short = len(sympy.Add.make_args(self.entry)) <= MOST_TERMS
+        forms = dict.fromkeys((self._derived, self.entry) if is_short else (self._derived,))
         return Slips(self._reference, list(forms), self._quantity, self._states)
 
-    @cached_property
+    @property
     def faults(self) -> list[Fault[Array]]:
         """The usual faults, with the entry's values."""
-        reference, entry = self._reference, self._entry
+        return [Fault(x.kind, x.text, values, x.detail) for x, _, values in self._found]
+
+    def formulas(self) -> Iterator[Fault[sympy.Expr]]:
+        """Yield the usual faults, each with the entry as it is then typed."""
+        for fault, part, _ in self._found:
+            yield replace(fault, result=self.entry - part + fault.result)
+
+    @cached_property
+    def _found(self) -> list[tuple[Fault[sympy.Expr], sympy.Expr, Array]]:
+        """The usual faults, the part in whose place each result stands, and the entry's values."""
+        reference, entry = self._reference, self.entry
         printed = reference.printed(entry)
         angles = [
             sympy.Symbol(name)
@@ -76,7 +92,9 @@ class TypedEntry:
         sizes = sizes[:, :1] + np.abs(values[:, replaced]) + sizes[:, len(parts) :]
         equal = np.all(is_alike(wrong, right, sizes), axis=(0, 2))
         return [
-            replace(fault, result=wrong[:, k, 0]) for k, fault in enumerate(faults) if not equal[k]
+            (fault, parts[replaced[k]], wrong[:, k, 0])
+            for k, fault in enumerate(faults)
+            if not equal[k]
         ]
 
 

@@ -17,13 +17,25 @@ from kincompile.cli.shared import output_option, read_model
 @click.option("--seed", type=int, default=0, metavar="S", help="The same seed, the same files.")
 @click.option("--signs", is_flag=True, help="Turn frames of bodies, so that signs differ too.")
 @click.option("--lengths", is_flag=True, help="Change points and distances given as numbers too.")
-def command(model: str, output: str, students: int, seed: int, signs: bool, lengths: bool) -> None:
+@click.option("--mistakes", is_flag=True, help="Find the mistake: Jacobians with one slip each.")
+def command(
+    model: str,
+    output: str,
+    students: int,
+    seed: int,
+    signs: bool,
+    lengths: bool,
+    mistakes: bool,
+) -> None:
     """Write an exercise on MODEL: a page and a hand-in file for each student.
 
     Each student has a variant of the mechanism that assembles and moves, drawn on a page, and the
-    same entries of Phi_q and gamma to derive. The folder instructor has the solutions; `kincompile
-    mark` checks what is handed in.
+    same entries of Phi_q and gamma to derive; with --mistakes three Jacobians in each of which an
+    entry is wrong, other ones for each student. The folder instructor has the solutions;
+    `kincompile mark` checks what is handed in.
     """
-    made = kc.exercise(read_model(model), students, seed, signs=signs, lengths=lengths)
+    made = kc.exercise(
+        read_model(model), students, seed, signs=signs, lengths=lengths, mistakes=mistakes
+    )
     written = made.write(Path(output))
     click.echo(f"Wrote {written}: {made.sizes}", err=True)

@@ -1,4 +1,4 @@
-"""The blanks of an exercise: entries of Phi_q and of gamma, the same for every student."""
+"""The blanks of an exercise: entries of Phi_q and of gamma, or where a slip in Phi_q is."""
 
 from __future__ import annotations
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 ENTRIES, ROWS = 6, 3
 """Blanks in Phi_q and in gamma."""
 
+PLACE = "place"
+"""The quantity of a blank in which the place of a slip in Phi_q is named."""
+
 MOST_OPERATIONS = 60
 """Operations up to which an entry is asked for by hand."""
 
@@ -26,9 +29,9 @@ MOST_OPERATIONS = 60
 class Blank:
     """An entry to be filled."""
 
-    name: str  # what it is called in the hand-in file, ``"B1"``
+    name: str  # what it is called in the hand-in file, ``"B1"``; ``"P1"`` of a place
     constraint: str  # name of the constraint
-    quantity: str  # ``"Phi_q"`` or ``"gamma"``
+    quantity: str  # ``"Phi_q"``, ``"gamma"`` or `PLACE`
     row: int  # index of the equation in the system
     column: int | None  # index of the coordinate; None of gamma
 
@@ -60,12 +63,12 @@ def choose_blanks(system: ConstraintSystem, seed: int) -> tuple[Blank, ...]:
             (item.name, "Phi_q", row, column)
             for row in own
             for column in range(len(system.coordinates))
-            if _is_fair(Phi_q[row, column])
+            if is_fair(Phi_q[row, column])
         ]
         random.shuffle(found)
         entries.append(found)
         gammas: list[tuple[str, str, int, int | None]] = [
-            (item.name, "gamma", row, None) for row in own if _is_fair(gamma[row, 0])
+            (item.name, "gamma", row, None) for row in own if is_fair(gamma[row, 0])
         ]
         random.shuffle(gammas)
         rows.append(gammas)
@@ -79,7 +82,7 @@ def choose_blanks(system: ConstraintSystem, seed: int) -> tuple[Blank, ...]:
     return tuple(Blank(f"B{k}", *item) for k, item in enumerate(chosen, 1))
 
 
-def _is_fair(entry: sympy.Expr) -> bool:
+def is_fair(entry: sympy.Expr) -> bool:
     """Return whether an entry varies, and is short enough to be derived by hand."""
     return bool(entry.free_symbols) and int(entry.count_ops()) <= MOST_OPERATIONS
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import InputError
-from kincompile.exercises.blanks import Blank, choose_blanks
+from kincompile.exercises.blanks import PLACE, Blank, choose_blanks
+from kincompile.exercises.mistakes import Mistake, choose_mistakes
 from kincompile.exercises.sheet import sheet, solutions
 from kincompile.exercises.variants import Choices, variants
 from kincompile.model.mechanism import Mechanism
@@ -19,10 +20,11 @@ from kincompile.report.to_html import as_html
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Sequence
 
     from kincompile.model.system import ConstraintSystem
 
-FORMAT = 1
+FORMAT = 2
 """Version of what `mark` reads."""
 
 STUDENTS, HAND_IN = "students", "hand_in.txt"
@@ -44,14 +46,17 @@ class ExerciseKit:
     name
         Name of the mechanism.
     blanks
-        What is to be filled, the same for all.
+        What each student is to fill.
     variants
-        The mechanism of each student.
+        The mechanism of each student, or the free equations.
+    mistakes
+        The Jacobians with a slip of each student; none where entries are to be derived.
     """
 
     name: str
-    blanks: tuple[Blank, ...]
-    variants: tuple[Mechanism, ...]
+    blanks: tuple[tuple[Blank, ...], ...]
+    variants: tuple[Mechanism | ConstraintSystem, ...]
+    mistakes: tuple[tuple[Mistake, ...], ...]
 
     @property
     def students(self) -> tuple[str, ...]:
@@ -63,16 +68,22 @@ class ExerciseKit:
         """Return the text of every file by its path; the same for the same seed."""
         systems = [item.system() for item in self.variants]
         found: dict[str, str] = {}
-        for student, system in zip(self.students, systems, strict=True):
+        for student, system, blanks, slips in zip(
+            self.students, systems, self.blanks, self.mistakes, strict=True
+        ):
             folder = f"{STUDENTS}/{student}"
-            page = sheet(system, self.blanks, student)
+            page = sheet(system, blanks, slips, student)
             found[f"{folder}/exercise.html"] = as_html(page, "Exercise")
-            found[f"{folder}/{HAND_IN}"] = self._hand_in(student, system)
+            found[f"{folder}/{HAND_IN}"] = self._hand_in(student, system, blanks)
             found[f"{INSTRUCTOR}/{MODELS}/{student}.toml"] = system.to_toml()
-        page = solutions(self.name, systems, self.blanks, self.students)
+        page = solutions(self.name, systems, self.blanks, self.mistakes, self.students)
         found[f"{INSTRUCTOR}/solutions.html"] = as_html(page, "Solutions of")
-        blanks = {"format": FORMAT, "blanks": [asdict(item) for item in self.blanks]}
-        found[f"{INSTRUCTOR}/{BLANKS}"] = json.dumps(blanks, indent=1) + "\n"
+        blanks_of = {
+            student: [asdict(item) for item in own]
+            for student, own in zip(self.students, self.blanks, strict=True)
+        }
+        key = {"format": FORMAT, "blanks": blanks_of}
+        found[f"{INSTRUCTOR}/{BLANKS}"] = json.dumps(key, indent=1) + "\n"
         return found
 
     def write(self, folder: str | os.PathLike[str]) -> Path:
@@ -102,19 +113,25 @@ class ExerciseKit:
             ) from error
         return target
 
-    def _hand_in(self, student: str, system: ConstraintSystem) -> str:
-        body = system.bodies[0]
-        last = body.coordinates[-1]
-        turned = f"sin({last})" if body.kind.units[-1] == "rad" else last
+    def _hand_in(self, student: str, system: ConstraintSystem, blanks: Sequence[Blank]) -> str:
+        last = system.bodies[0].coordinates[-1] if system.bodies else system.coordinates[0].name
+        turned = f"sin({last})" if system.ground.kind.units[-1] == "rad" else last
         lines = [
-            f"# {self.name}, student {student}. Write a formula after each = sign, for instance",
-            f"#   B1 = -0.25*{turned}*{rate(last)}**2",
-            "# Lines with # are comments. An empty blank has no points.",
-            "",
+            f"# {self.name}, student {student}. Write a formula after each = sign, for instance"
         ]
-        lines += [
-            line for item in self.blanks for line in (f"# {item.label(system)}", f"{item.name} =")
-        ]
+        if any(item.quantity == PLACE for item in blanks):
+            entry = f"{system.equations[0]}, {system.coordinates[0].name}"
+            lines += [f"#   P1 = {entry}", f"#   B1 = -0.25*{turned}"]
+        else:
+            lines.append(f"#   B1 = -0.25*{turned}*{rate(last)}**2")
+        lines += ["# Lines with # are comments. An empty blank has no points.", ""]
+        for item in blanks:
+            question = item.label(system)
+            if item.quantity == PLACE:
+                question = f"Phi_q of {item.constraint}: which entry is wrong?"
+            elif f"P{item.name[1:]}" in [other.name for other in blanks]:
+                question = "and what belongs there"
+            lines += [f"# {question}", f"{item.name} ="]
         return "\n".join(lines) + "\n"
 
     def __repr__(self) -> str:
@@ -124,16 +141,17 @@ class ExerciseKit:
     @property
     def sizes(self) -> str:
         """How many students and blanks it has, in words."""
-        return f"{len(self.variants)} students, {len(self.blanks)} blanks"
+        return f"{len(self.variants)} students, {len(self.blanks[0])} blanks"
 
 
 def exercise(
-    model: Mechanism,
+    model: Mechanism | ConstraintSystem,
     students: int = 1,
     seed: int = 0,
     *,
     signs: bool = False,
     lengths: bool = False,
+    mistakes: bool = False,
 ) -> ExerciseKit:
     """Make an exercise: for each student a variant of a mechanism with entries to derive by hand.
 
@@ -153,6 +171,10 @@ def exercise(
         Turn the frames of some bodies by half a turn, so that signs differ too.
     lengths
         Change points and distances that are given as numbers too.
+    mistakes
+        Find the mistake: three Jacobians of constraints are shown, each with one slip, other ones
+        for each student. The blanks are its place and the right entry. Free equations, which have
+        no variants, may be given too.
 
     Returns
     -------
@@ -166,7 +188,7 @@ def exercise(
     InputError
         If it is no mechanism with joints, or no variants are found that assemble.
     """
-    if not isinstance(model, Mechanism):
+    if not isinstance(model, Mechanism) and not mistakes:
         raise InputError(
             f"{getattr(model, 'name', model)} is no mechanism of bodies and joints, which an "
             "exercise needs: it is a system of free equations"
@@ -174,9 +196,15 @@ def exercise(
     wanted: Any = students  # whatever its type says
     if not isinstance(wanted, int) or not 1 <= wanted <= MOST_STUDENTS:
         raise InputError(f"{students!r} students: give a number from 1 to {MOST_STUDENTS}")
-    made = variants(model, students, seed, Choices(signs, lengths))
-    blanks = choose_blanks(made[0].system(), seed)
-    return ExerciseKit(model.name, blanks, tuple(made))
+    made: list[Any] = [model] * students
+    if isinstance(model, Mechanism):
+        made = [*variants(model, students, seed, Choices(signs, lengths))]
+    if not mistakes:
+        blanks = choose_blanks(made[0].system(), seed)
+        return ExerciseKit(model.name, (blanks,) * students, tuple(made), ((),) * students)
+    slips = [choose_mistakes(x.system(), f"{seed}-{k}") for k, x in enumerate(made, start=1)]
+    filled = tuple(tuple(x for item in own for x in (item.place, item.entry)) for own in slips)
+    return ExerciseKit(model.name, filled, tuple(made), tuple(slips))
 
 
 def require_new_folder(folder: Path) -> None:

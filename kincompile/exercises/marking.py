@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from kincompile.checker.compare import compare
 from kincompile.checker.reference import Reference
 from kincompile.errors import InputError, InternalError, KincompileError
-from kincompile.exercises.blanks import Blank
+from kincompile.exercises.blanks import PLACE, Blank
 from kincompile.exercises.kit import BLANKS, FORMAT, HAND_IN, INSTRUCTOR, MODELS, STUDENTS
 from kincompile.files.content import decoded, file_content
 from kincompile.files.files import read
-from kincompile.names import escaped
+from kincompile.names import column_name, escaped, listed
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
@@ -42,7 +42,9 @@ MOST_CHARACTERS = 300
 """Characters of a reason."""
 
 _COMMENT = re.compile(r"[#%].*")
-_LINE = re.compile(r"\s*(B\d+)\b\s*(=?)\s*(.*)", re.IGNORECASE)
+_LINE = re.compile(r"\s*([BP]\d+)\b\s*(=?)\s*(.*)", re.IGNORECASE)
+_ENTRY = re.compile(r"(?:Phi_q\s*)?\[?\s*([^,\[\]]+?)\s*,\s*([^,\[\]]+?)\s*\]?", re.IGNORECASE)
+"""An entry as it is named: ``A.x, phi_crank`` or ``Phi_q[A.x, crank.phi]``."""
 _PLACE = re.compile(r"\w+, row \d+, column \d+: (line 1, )?")
 """Where a formula stands in a matrix, which no student has seen."""
 
@@ -119,9 +121,9 @@ def mark(folder: str | os.PathLike[str]) -> Marks:
         If the folder is no exercise.
     """
     target = Path(folder)
-    blanks, students = _key(target)
+    key = _key(target)
     found: dict[str, tuple[Mark, ...]] = {}
-    for student in students:
+    for student, blanks in key.items():
         lines, problem = _lines(target / STUDENTS / student / HAND_IN)
         answers, unread = _answers(lines)
         marks = {item: Mark(item, 0, problem or unread.get(item.name, EMPTY)) for item in blanks}
@@ -221,31 +223,38 @@ def _memory() -> int:
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
 
 
-def _key(folder: Path) -> tuple[list[Blank], list[str]]:
-    """Return the blanks and the students of an exercise."""
+def _key(folder: Path) -> dict[str, list[Blank]]:
+    """Return the blanks of each student of an exercise."""
     path = folder / INSTRUCTOR / BLANKS
     try:
         data: Any = json.loads(path.read_text(encoding="utf-8"))
-        blanks = [
-            Blank(**{item.name: row[item.name] for item in fields(Blank)}) for row in data["blanks"]
-        ]
-        if data["format"] != FORMAT or not blanks:
+        if data["format"] != FORMAT:
             raise InputError(
                 f"{path} has the format {data['format']}, and this version reads {FORMAT}"
             )
+        found = {
+            str(student): [
+                Blank(**{item.name: row[item.name] for item in fields(Blank)}) for row in rows
+            ]
+            for student, rows in data["blanks"].items()
+        }
     except OSError as error:
         raise InputError(
             f"{folder} is no exercise: {path} cannot be read; give the folder that "
             "`kincompile exercise` wrote"
         ) from error
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(
             f"{path} is not the key of an exercise; write the exercise again with the same seed"
         ) from error
     students = sorted(item.stem for item in (folder / INSTRUCTOR / MODELS).glob("*.toml"))
     if not students:
         raise InputError(f"{folder / INSTRUCTOR / MODELS} has no models of students")
-    return blanks, students
+    if without := [student for student in students if not found.get(student)]:
+        raise InputError(
+            f"{path} has no blanks of {listed(without)}; write the exercise again with its seed"
+        )
+    return {student: found[student] for student in students}
 
 
 def _lines(path: Path) -> tuple[list[str], str]:
@@ -282,6 +291,10 @@ def _marked(
     """Mark what is filled, of each constraint together; alone where something cannot be read."""
     found: dict[Blank, Mark] = {}
     filled = [item for item in blanks if item.name in answers]
+    for item in filled:
+        if item.quantity == PLACE:
+            found[item] = _place_mark(reference.system, item, answers[item.name])
+    filled = [item for item in filled if item.quantity != PLACE]
     for constraint in dict.fromkeys(item.constraint for item in filled):
         own = [item for item in filled if item.constraint == constraint]
         try:
@@ -321,6 +334,23 @@ def _compared(
     )
     entries = {entry.label: entry for entry in report.entries}
     return {item: _mark_of(item, entries[item.label(system)]) for item in blanks}
+
+
+def _place_mark(system: ConstraintSystem, blank: Blank, answer: str) -> Mark:
+    """Mark the place of a slip, by the names of its equation and coordinate."""
+    first, last = _rows(system, blank.constraint)
+    equations = system.equations[first:last]
+    coordinates = [item.name for item in system.coordinates]
+    named = _ENTRY.fullmatch(answer)
+    row, column = (named[1], column_name(named[2])) if named else ("", "")
+    if row not in equations or column not in coordinates:
+        return Mark(blank, 0, _short(
+            f"no entry of Phi_q of {blank.constraint}: {answer}. Write an equation and a "
+            f"coordinate, as {equations[0]}, {coordinates[0]}"
+        ))  # fmt: skip
+    if (row, column) == (system.equations[blank.row], coordinates[blank.column or 0]):
+        return Mark(blank, 1, RIGHT)
+    return Mark(blank, 0, f"{row}, {column} is right as it stands")
 
 
 def _mark_of(blank: Blank, entry: ComparedEntry) -> Mark:

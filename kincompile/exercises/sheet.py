@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import sympy
@@ -12,6 +13,7 @@ from kincompile.derivations.assembled import orientation_in_words
 from kincompile.derivations.derivation import constraint_chapters
 from kincompile.derivations.evaluation import evaluation
 from kincompile.derivations.figures import Figures
+from kincompile.exercises.blanks import PLACE
 from kincompile.model.resolve import Joint
 from kincompile.names import rate
 from kincompile.report import document as doc
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from kincompile.exercises.blanks import Blank
+    from kincompile.exercises.mistakes import Mistake
     from kincompile.model.system import ConstraintSystem
 
 RULE_STEP, BLOCK_STEP, GAMMA_STEP = 2, 3, 5
@@ -30,19 +33,21 @@ LINE = "_" * 22
 """Where a formula is written on paper."""
 
 
-def sheet(system: ConstraintSystem, blanks: Sequence[Blank], student: str) -> doc.Manuscript:
+def sheet(
+    system: ConstraintSystem, blanks: Sequence[Blank], mistakes: Sequence[Mistake], student: str
+) -> doc.Manuscript:
     """Return the page of one student."""
     figures = Figures(evaluation(system, None))
     names, chapters = constraint_chapters(figures)
     given = tuple(
         doc.Chapter(item.anchor, item.title, (), item.sections[:2])
         for item, constraint in zip(chapters, system.constraints, strict=True)
-        if isinstance(constraint, Joint)
+        if isinstance(constraint, Joint) or mistakes
     )
     parts = (
         _mechanism(figures),
         doc.Chapter("given", ("The constraints",), (), given),
-        _tasks(system, blanks),
+        _to_be_found(system, mistakes) if mistakes else _tasks(system, blanks),
         _hints(system, blanks, chapters),
     )
     summary = f"Student {student}. Write the formulas into hand_in.txt, which has a line for each."
@@ -50,19 +55,31 @@ def sheet(system: ConstraintSystem, blanks: Sequence[Blank], student: str) -> do
 
 
 def solutions(
-    name: str, systems: Sequence[ConstraintSystem], blanks: Sequence[Blank], students: Sequence[str]
+    name: str,
+    systems: Sequence[ConstraintSystem],
+    blanks: Sequence[Sequence[Blank]],
+    mistakes: Sequence[Sequence[Mistake]],
+    students: Sequence[str],
 ) -> doc.Manuscript:
     """Return the page of the instructor: the right formula of every blank of every student."""
     chapters = []
-    for system, student in zip(systems, students, strict=True):
+    for system, own, slips, student in zip(systems, blanks, mistakes, students, strict=True):
         derived = system.Phi_q, system.gamma
+        texts = {item.entry: item.text for item in slips}
         rows: list[tuple[doc.Run | doc.Runs, ...]] = [
-            (item.name, doc.Math(_symbol(item, system)), doc.Math(item.answer(*derived)))
-            for item in blanks
+            (
+                item.name,
+                doc.Math(_symbol(item, system)),
+                doc.Math(item.answer(*derived)),
+                *((texts[item],) if slips else ()),
+            )
+            for item in own
+            if item.quantity != PLACE
         ]
-        shown = doc.table(("blank", "entry", "formula"), rows)
+        header = ("blank", "entry", "formula", *(("the slip",) if slips else ()))
+        shown = doc.table(header, rows)
         chapters.append(doc.Chapter(f"student-{student}", (f"Student {student}",), (shown,)))
-    summary = f"{len(systems)} students, {len(blanks)} blanks each. Not for students."
+    summary = f"{len(systems)} students, {len(blanks[0])} blanks each. Not for students."
     return doc.Manuscript(name, summary, tuple(chapters))
 
 
@@ -71,6 +88,12 @@ def _mechanism(figures: Figures) -> doc.Chapter:
     blocks: list[doc.Block] = []
     if (shown := figures.mechanism()) is not None:
         blocks.append(doc.Figure(shown))
+    if not system.bodies:
+        rows_of_names: list[tuple[doc.Run | doc.Runs, ...]] = [
+            (doc.Verbatim(item.name), item.unit) for item in system.coordinates
+        ]
+        names = doc.table(("coordinate", "unit"), rows_of_names)
+        return doc.Chapter("mechanism", ("The coordinates",), (names,))
     kind = system.ground.kind
     blocks += orientation_in_words(system)
     blocks.append(
@@ -110,6 +133,33 @@ def _tasks(system: ConstraintSystem, blanks: Sequence[Blank]) -> doc.Chapter:
     ]
     shown = doc.table(("blank", "entry", "formula"), rows)
     return doc.Chapter("tasks", ("The blanks",), (note, shown))
+
+
+def _to_be_found(system: ConstraintSystem, mistakes: Sequence[Mistake]) -> doc.Chapter:
+    """Return the Jacobians with a slip each."""
+    note = doc.text(
+        "Each of these Jacobians was derived by hand, and one of its entries is wrong. Find it, "
+        "and derive what belongs there. The constraints as given above are right. Entries that are "
+        "not listed are zero, and are so rightly."
+    )
+    parts = []
+    for item in mistakes:
+        rows: list[tuple[doc.Run | doc.Runs, ...]] = [
+            (doc.Verbatim(entry.label(system)), doc.Math(_symbol(entry, system)), doc.Math(formula))
+            for (row, column), formula in item.rows.items()
+            for entry in (replace(item.entry, row=row, column=column),)
+        ]
+        shown = doc.table(("entry", "derivative", "as derived by hand"), rows)
+        asked = doc.text(
+            doc.Verbatim(item.place.name), f": the wrong entry {LINE}   ",
+            doc.Verbatim(item.entry.name), f": what belongs there {LINE}",
+        )  # fmt: skip
+        names: doc.Runs = (
+            f"{item.place.name}, {item.entry.name}: ",
+            doc.Verbatim(item.entry.constraint),
+        )
+        parts.append(doc.Chapter(f"mistake-{item.place.name}", names, (shown, asked)))
+    return doc.Chapter("tasks", ("Find the mistake",), (note,), tuple(parts))
 
 
 def _hints(

@@ -51,7 +51,7 @@ def by_hand(system: Any, row: int, column: int | None) -> Any:
 def fill(folder: Path, student: str, change: dict[str, Any]) -> None:
     """Write the hand-in file of a student: right answers, some of them changed."""
     system = kc.read(folder / "instructor" / "models" / f"{student}.toml").system()
-    blanks = json.loads((folder / "instructor" / "blanks.json").read_text())["blanks"]
+    blanks = json.loads((folder / "instructor" / "blanks.json").read_text())["blanks"][student]
     lines = ["# my answers"]
     for item in blanks:
         answer = by_hand(system, item["row"], item["column"])
@@ -89,10 +89,10 @@ def test_that_variants_of_a_ready_exercise_assemble_and_differ(name: str) -> Non
         assert not variant.parameters
         texts.add(variant.to_toml())
     assert len(texts) == 2
-    quantities = {item.quantity for item in made.blanks}
+    quantities = {item.quantity for item in made.blanks[0]}
     assert quantities == {"Phi_q", "gamma"}
     system = made.variants[0].system()
-    for item in made.blanks:  # what is asked for varies, and is no riddle
+    for item in made.blanks[0]:  # what is asked for varies, and is no riddle
         answer = item.answer(system.Phi_q, system.gamma)
         assert answer.free_symbols
         assert sympy.count_ops(answer) <= 100
@@ -183,7 +183,7 @@ def test_that_the_sign_of_a_whole_row_is_that_of_the_given_constraint(tmp_path: 
     m.add(kc.AbsoluteX("push", plate, (0.2, 0.1), 1.2 + kc.t / 10))
     m.add(kc.AbsoluteAngle("turn", plate, kc.t / 2))
     folder = kc.exercise(m, 1, 1).write(tmp_path / "kit")
-    blanks = json.loads((folder / "instructor" / "blanks.json").read_text())["blanks"]
+    blanks = json.loads((folder / "instructor" / "blanks.json").read_text())["blanks"]["01"]
     rod = [item["name"] for item in blanks if item["constraint"] == "rod"]
     assert len(rod) == 4  # the whole row of Phi_q, and gamma
     fill(folder, "01", {name: (lambda x: -x) for name in rod})
