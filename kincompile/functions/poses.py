@@ -59,6 +59,8 @@ class Signature:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     parameters: tuple[str, ...]  # that the inputs are
+    rates: tuple[str, ...]  # that their rates are, where there are twists
+    is_twist: NDArray[np.bool_]  # (n,)
     coordinates: tuple[str, ...]
     # Of inputs (m,), outputs (n,) and coordinates: the size of the mechanism for lengths, else 1.
     scales: tuple[Array, Array, Array]
@@ -71,7 +73,7 @@ class Poses(Shown):
     Attributes
     ----------
     u, x : ndarray, shape (..., m), (..., n)
-        Inputs and outputs.
+        Inputs and outputs; velocities have no x, so theirs is NaN.
     q : ndarray
         All coordinates.
     status : ndarray of int, shape (...)
@@ -135,7 +137,9 @@ class Poses(Shown):
     def by(self, parameters: str | Sequence[str]) -> Array:
         """Return derivatives of the outputs by k parameters, (..., n, k)."""
         names = names_of(parameters, "parameters")
-        return self._derivatives(names, self.signature.outputs, second=False)[0]
+        found = self._derivatives(names, self.signature.outputs, second=False)[0]
+        found[..., self.signature.is_twist, :] = np.nan
+        return found
 
     def _derivatives(
         self, names: Sequence[str], outputs: Sequence[str], *, second: bool
@@ -157,9 +161,15 @@ class Poses(Shown):
     def _by_inputs(self, *, second: bool) -> tuple[Array, Any]:
         """Return J, and with it second derivatives if wanted: computed once."""
         if True not in self._made and second not in self._made:
-            names = self.signature.parameters
-            outputs = self.signature.outputs
-            self._made[second] = self._derivatives(names, outputs, second=second)
+            f = self.signature
+            names, k = (*f.rates, *f.parameters), len(f.rates)
+            first, pairs = self._derivatives(names, f.outputs, second=second)
+            slopes, own = first[..., k:], None if pairs is None else pairs[..., k:, k:]
+            if k:  # of velocities at rates v their slopes by v
+                slopes[..., f.is_twist, :] = first[..., f.is_twist, :k]
+            if k and own is not None:
+                own[..., f.is_twist, :, :] = pairs[..., f.is_twist, :k, k:]
+            self._made[second] = slopes, own
         return self._made.get(True) or self._made[False]
 
     @property
@@ -169,7 +179,7 @@ class Poses(Shown):
 
     @property
     def second(self) -> Array:
-        """Second derivatives of the outputs by the inputs, (..., n, m, m)."""
+        """Derivatives of J by the inputs, (..., n, m, m); symmetric but for velocities."""
         found: Array = self._by_inputs(second=True)[1]
         return found
 

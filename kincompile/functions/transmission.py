@@ -6,7 +6,9 @@ the derivatives in
 .. math:: J = \frac{\partial x}{\partial u}, \qquad \dot x = J \dot u, \qquad
           \ddot x = J \ddot u + \dot J \dot u, \qquad \tau_u = J^T \tau_x
 
-are its sensitivities to them. Nothing here solves, and nothing here differentiates.
+are its sensitivities to them. A velocity, such as omega of a body, has no x, but it has a J: its
+derivatives by the rates v of inputs u + v t, at t = 0. Nothing here solves, and nothing here
+differentiates.
 """
 
 from __future__ import annotations
@@ -71,7 +73,10 @@ def transmission(
         Names of drivers, or of other constraints that have a value, whose value becomes an input,
         and of coordinates, as ``"phi_crank"`` or ``"crank.phi"``. A motion law is not needed.
     outputs
-        Names of coordinates, outputs and points.
+        Names of coordinates, outputs and points, and of velocities: components of the angular
+        velocity of a body in space, ``"omega_x_foot"`` in the ground's frame or ``"omega_xi_foot"``
+        in its own, or an output that is linear in rates. J maps u_dot to them, and `effort` their
+        torques to the inputs; they have no x, so theirs is NaN.
     target
         ``"numpy"``, or ``"c"`` for compiled functions, as for `compile`.
 
@@ -90,7 +95,7 @@ def transmission(
     SolveError
         If it cannot be assembled at the first values of its inputs.
     """
-    loop = loop_of(model, names_of(inputs, "inputs"), names_of(outputs, "outputs"))
+    loop = loop_of(model, names_of(inputs, "inputs"), names_of(outputs, "outputs"), moving=True)
     return Transmission(loop, target=target)
 
 
@@ -110,6 +115,8 @@ class Transmission(Shown):
         Names, in the order of u and x; of points the components.
     held : tuple of str
         Freedoms that no output sees, and that are held.
+    twists : tuple of str
+        Outputs that are velocities, which have derivatives but no x.
     units : dict
         Unit of each input and output.
     loop : Loop
@@ -122,7 +129,7 @@ class Transmission(Shown):
 
     def __init__(self, loop: Loop, *, target: str = "numpy", guess: Array | None = None) -> None:
         self.loop, self.name, self.held, self.target = loop, loop.system.name, loop.held, target
-        self.inputs, self.outputs = loop.inputs, loop.outputs
+        self.inputs, self.outputs, self.twists = loop.inputs, loop.outputs, loop.twists
         self.module: ModuleType = compiled(loop.system, target)
         self._code = code_of(self.module)
         units = self._code.units
@@ -154,7 +161,8 @@ class Transmission(Shown):
             for names in (self.inputs, self.outputs)
         )
         held = f"; no output sees, and held is: {listed(self.held)}" if self.held else ""
-        return f"{self.name}: ({given}) -> ({found}){held}"
+        twists = f"; velocities, without x: {listed(self.twists)}" if self.twists else ""
+        return f"{self.name}: ({given}) -> ({found}){twists}{held}"
 
     def __repr__(self) -> str:
         """Return inputs and outputs."""
@@ -229,7 +237,7 @@ class Transmission(Shown):
         kept: list[Array] = []
         for q in assemblies(self.module, 0.0, sets[0]):
             x = self._poses(self._solved(sets, q, sets[0]), sets, ()).x
-            if all(np.abs((x - other) / self.signature.scales[1]).max() > SAME for other in kept):
+            if all(_apart((x - other) / self.signature.scales[1]) > SAME for other in kept):
                 kept.append(x)
         return np.array(kept).reshape(-1, len(self.outputs))
 
@@ -239,12 +247,14 @@ class Transmission(Shown):
         sizes = np.asarray(problem(self._code, self.home.p, self.home.q, 0.0).reference)
         length = float(max(sizes[~self._code.angular], default=1.0))
         unit = self.system.length_unit
+        lengths = unit, f"{unit}/s"
         given, found = (
-            np.array([length if self.units[name] == unit else 1.0 for name in names])
+            np.array([length if self.units[name] in lengths else 1.0 for name in names])
             for names in (self.inputs, self.outputs)
         )
         return Signature(
-            self.name, self.inputs, self.outputs, self.loop.parameters, self._code.coordinates,
+            self.name, self.inputs, self.outputs, self.loop.parameters, self.loop.rates,
+            np.array([name in self.twists for name in self.outputs]), self._code.coordinates,
             (given, found, sizes),
         )  # fmt: skip
 
@@ -285,6 +295,7 @@ class Transmission(Shown):
         columns = np.concatenate((solution.q[:, 0], solution.observed.y[:, 0]), axis=-1)
         names = (*self._code.coordinates, *self._code.outputs)
         x = columns[:, [names.index(name) for name in self.outputs]]
+        x[:, self.signature.is_twist] = np.nan
         u = sets[:, sets.shape[1] - len(self.inputs) :]
         u, x, q = (part.reshape(*shape, part.shape[-1]) for part in (u, x, solution.q[:, 0]))
         return Poses(u, x, q, solution.status.reshape(shape), self.signature, solution)
@@ -299,7 +310,8 @@ class Transmission(Shown):
     def _sets(self, u: ArrayLike, p: Values) -> tuple[Array, tuple[int, ...]]:
         """Return sets of parameters (B, k), and the shape of the batch."""
         inputs, values = self._vector(u, "u", self.inputs), dict(mapping_of(p, "p"))
-        names = self._code.parameters[: len(self._code.parameters) - len(self.inputs)]
+        count = len(self._code.parameters) - len(self.inputs) - len(self.loop.rates)
+        names = self._code.parameters[:count]
         arrays = {}
         for name, value in values.items():
             if name not in names:
@@ -317,8 +329,8 @@ class Transmission(Shown):
         if not math.prod(shape):
             raise InputError(f"u has the shape {inputs.shape}: give at least one pose.")
         sets = np.empty((*shape, len(self._code.parameters)))
-        sets[..., : len(names)] = self._code.defaults[: len(names)]
-        sets[..., len(names) :] = inputs
+        sets[...] = self._code.defaults
+        sets[..., sets.shape[-1] - len(self.inputs) :] = inputs
         for name, value in arrays.items():
             sets[..., names.index(name)] = value
         return sets.reshape(-1, sets.shape[-1]), shape
@@ -332,6 +344,11 @@ class Transmission(Shown):
                 f"{self.name}, of length {len(names)}."
             )
         return found
+
+
+def _apart(differences: Array) -> float:
+    """Return the largest of those that are numbers."""
+    return float(np.max(np.abs(differences), initial=0.0, where=~np.isnan(differences)))
 
 
 def _numbers(given: Any, what: str) -> Array:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from kincompile.criteria import AGREEMENT, SOLVED
-from kincompile.errors import InputError, StructuralError
+from kincompile.errors import StructuralError
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.elimination import plan_solve, sizes_of
 from kincompile.ir.graph import Graph, depending_on, pruned, reachable
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from kincompile.ir.elimination import SolvePlan
     from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.program import Program
     from kincompile.model.bodies import Parameter
 
 Place = tuple[str, int]
@@ -98,12 +99,11 @@ def transmission_code(
     """Return the code of a mechanism as a function from parameters to coordinates and outputs.
 
     The inputs are the names of parameters, and what they are called; `near` is a position at
-    their defaults. Nothing depends on time.
+    their defaults. Nothing depends on time. An output that is linear in velocities has a Jacobian
+    and no value, which is NaN.
 
     Raises
     ------
-    InputError
-        If an output reads velocities.
     StructuralError
         If the equations do not determine the coordinates.
     """
@@ -115,7 +115,6 @@ def transmission_code(
     graph = Graph(code.nodes)
     rows = [x.node for x in sorted(code.entries("Phi"), key=lambda x: x.row)]
     wanted = [_node_of(code, graph, name) for name in outputs]
-    _require_position(code, graph, dict(zip(outputs, wanted, strict=True)))
     by_inputs = [tangents(graph, rows, {graph.input(name): graph.const(1)}) for name in inputs]
     made, explicit = _explicit(code, graph, rows)
     new = made.instantiate(graph.nodes, explicit.values)
@@ -128,17 +127,22 @@ def transmission_code(
     step: dict[int, int] = dict(zip(q, (change[k] for k in free), strict=True))
     x = [new[node] for node in wanted]
     moved = tangents(made, x, step)
+    rates = {made.input(rate(name)): explicit.values[name] for name in _column_of(program)}
+    moving = depending_on(made.nodes, list(rates))
     slopes, along = [], []
     for name, own in zip(inputs, by_inputs, strict=True):
         found = solve.solve([made.neg(new[node]) for node in own])
         slopes.append([found[k] for k in free])
         way: dict[int, int] = dict(zip(q, slopes[-1], strict=True))
-        along.append(tangents(made, x, way | {made.input(name): made.const(1)}))
+        way[made.input(name)] = made.const(1)
+        # Of a velocity, linear in the rates of coordinates, what it is at their slopes.
+        spin = dict(zip(rates, tangents(made, list(rates.values()), way), strict=True))
+        along.append([tangents(made, [y], spin if y in moving else way)[0] for y in x])
     sizes = sizes_of(code)
     vectors = {
         "change": list(step.values()),
         "slopes": [node for own in zip(*slopes, strict=True) for node in own],
-        "x": [made.sub(a, b) for a, b in zip(x, moved, strict=True)],
+        "x": [made.nan() if a in moving else made.sub(a, b) for a, b in zip(x, moved, strict=True)],
         "J": [node for own in zip(*along, strict=True) for node in own],
         "determinants": _determinants(made, solve.determinants, plan),
         "missed": [_missed(code, made, solve, [new[x] for x in rows], sizes.entries)],
@@ -169,6 +173,11 @@ def transmission_code(
     )
 
 
+def _column_of(program: Program) -> dict[str, int]:
+    """Return the columns of the coordinates by name."""
+    return {x.name: k for k, x in enumerate(program.coordinates)}
+
+
 @dataclass(frozen=True, slots=True)
 class _Explicit:
     """Coordinates that an equation gives by the others: its rows, columns, and all as nodes."""
@@ -188,8 +197,8 @@ def _explicit(code: InlineProgram, graph: Graph, rows: Sequence[int]) -> tuple[G
     program = code.program
     made = Graph()
     values: dict[Any, int] = {x[1]: made.input(x[1]) for x in graph.nodes if x[0] == "input"}
-    column_of = {x.name: k for k, x in enumerate(program.coordinates)}
-    values |= {name: made.input(name) for name in column_of}
+    columns = _column_of(program)
+    values |= {name: made.input(name) for name in columns}
     left_out = {program.equations.index(name) for name in program.redundant}
     taken: dict[int, int] = {}
     for row, node in enumerate(rows):
@@ -197,11 +206,11 @@ def _explicit(code: InlineProgram, graph: Graph, rows: Sequence[int]) -> tuple[G
             continue
         own, number = pruned(graph.nodes, [node])
         here = made.instantiate(own, values)[number[node]]
-        found = _given_by(made, here, [x for x in column_of if column_of[x] not in taken])
+        found = _given_by(made, here, [x for x in columns if columns[x] not in taken])
         if found is None:
             continue
         name, rest = found
-        taken[column_of[name]] = row
+        taken[columns[name]] = row
         parts = list(values.values())
         used = reachable(made.nodes, parts)
         if made.input(name) in used:
@@ -237,18 +246,6 @@ def _node_of(code: InlineProgram, graph: Graph, name: str) -> int:
         return graph.input(name)
     row = names.index(name)
     return next(entry.node for entry in code.entries("outputs") if entry.row == row)
-
-
-def _require_position(code: InlineProgram, graph: Graph, outputs: Mapping[str, int]) -> None:
-    """Refuse outputs that are no function of the position."""
-    moving = [rate(x.name, order) for x in code.program.coordinates for order in (1, 2)]
-    found = depending_on(graph.nodes, [graph.input(name) for name in moving])
-    for name, node in outputs.items():
-        if node in found:
-            raise InputError(
-                f"the output {name!r} of {code.program.name} reads velocities, and a transmission "
-                "has none: choose outputs of the position"
-            )
 
 
 def _determinants(graph: Graph, found: Sequence[int], plan: SolvePlan) -> list[int]:

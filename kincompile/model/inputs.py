@@ -15,10 +15,10 @@ import sympy
 from kincompile.errors import InputError
 from kincompile.model.bodies import Parameter
 from kincompile.model.equation import Equation
-from kincompile.model.expressions import depends_on, evaluate
+from kincompile.model.expressions import depends_on, evaluate, t
 from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint
-from kincompile.names import column_name, listed, unknown
+from kincompile.names import column_name, listed, quotient_unit, unknown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,8 +33,13 @@ def input_name(name: str) -> str:
     return f"u_{name}"
 
 
+def input_rate(name: str) -> str:
+    """Return the name of the parameter that the rate of an input is."""
+    return f"v_{name}"
+
+
 def with_inputs(
-    model: Mechanism | ConstraintSystem, inputs: Sequence[str]
+    model: Mechanism | ConstraintSystem, inputs: Sequence[str], *, moving: bool = False
 ) -> tuple[ConstraintSystem, tuple[str, ...]]:
     """Return the mechanism whose inputs are parameters, and the names of its inputs.
 
@@ -45,12 +50,15 @@ def with_inputs(
     inputs
         Names of drivers, or of other constraints that have a value, and of coordinates, as
         ``"phi_crank"`` or ``"crank.phi"``.
+    moving
+        Whether inputs move at rates, u + v t: at t = 0 velocities are then those of the rates.
 
     Returns
     -------
     ConstraintSystem
         Without loads. Its last parameters, `input_name` of each input, have the value of a driver
-        at t = 0 as their default, or the guess of a coordinate.
+        at t = 0 as their default, or the guess of a coordinate. Before them are the rates, 0 by
+        default, where inputs are `moving`.
     tuple of str
         The names as the mechanism has them: ``"phi_crank"`` for ``"crank.phi"``.
 
@@ -68,18 +76,20 @@ def with_inputs(
     names = tuple(x if x in valued else column_name(x) for x in map(str, inputs))
     if problems := [*_unknown(system, names, [*valued, *coordinates]), *_moving(system, names)]:
         raise InputError(problems)
-    parameters, more = [], []
+    parameters, rates, more, values = [], [], [], {}
     for name in names:
         symbol = sympy.Symbol(input_name(name))
+        values[name] = symbol + sympy.Symbol(input_rate(name)) * t if moving else symbol
         if name in valued:
             value, unit = _value(system, valued[name])
         else:
             value, unit = coordinates[name].guess, coordinates[name].unit
-            more.append(Equation(f"input_{name}", sympy.Symbol(name) - symbol))
+            more.append(Equation(f"input_{name}", sympy.Symbol(name) - values[name]))
         parameters.append(Parameter(symbol.name, value, unit))
-    given = {name: _given(valued[name]) for name in names if name in valued}
+        rates += [Parameter(input_rate(name), 0.0, quotient_unit(unit, "s"))] if moving else []
+    given = {name: _given(valued[name], values[name]) for name in names if name in valued}
     changed = [given.get(item.name, item) for item in system.constraints]
-    return system.rewritten(changed, more, (*system.parameters, *parameters)), names
+    return system.rewritten(changed, more, (*system.parameters, *rates, *parameters)), names
 
 
 def _unknown(system: ConstraintSystem, names: Sequence[str], known: Sequence[str]) -> list[str]:
@@ -104,11 +114,12 @@ def _unknown(system: ConstraintSystem, names: Sequence[str], known: Sequence[str
         elif not is_known:
             text = f"{system.name} has no driver and no coordinate {name!r}"
             found.append(unknown(text, name, known, "; or add a driver of this name"))
-        elif input_name(name) in taken:
-            found.append(
-                f"{system.name} has the name {input_name(name)!r}, which the input {name!r} takes "
-                "for its value: rename it."
-            )
+        for own, what in ((input_name(name), "value"), (input_rate(name), "rate")):
+            if is_known and own in taken:
+                found.append(
+                    f"{system.name} has the name {own!r}, which the input {name!r} takes for its "
+                    f"{what}: rename it."
+                )
     return found
 
 
@@ -147,10 +158,10 @@ def _value(system: ConstraintSystem, driver: Joint) -> tuple[float, str]:
     return value, system.length_unit if given.unit == "length" else given.unit
 
 
-def _given(item: Joint) -> Joint:
-    """Return a driver whose value is a parameter."""
-    symbol, arguments = sympy.Symbol(input_name(item.name)), item.written.arguments()
+def _given(item: Joint, value: sympy.Expr) -> Joint:
+    """Return a driver whose value is given by parameters."""
+    arguments = item.written.arguments()
     (place,) = (name for name, given in arguments.items() if given.symbol == "C")
-    changed: dict[str, Any] = {place: symbol}
+    changed: dict[str, Any] = {place: value}
     written = replace(item.written, **changed)
-    return replace(item, written=written, scalars={**item.scalars, "C": symbol})
+    return replace(item, written=written, scalars={**item.scalars, "C": value})

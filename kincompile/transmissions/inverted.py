@@ -32,6 +32,11 @@ def inverted(loop: Loop, x: Sequence[float]) -> Loop:
             f"{system.name} has {m} inputs and {n} outputs, and an inverse needs as many of both: "
             f"choose {m} of {listed(loop.outputs)}."
         )
+    if loop.twists:
+        raise InputError(
+            f"{system.name} has velocities among its outputs, {listed(loop.twists)}, which no "
+            "position gives: leave them out of a transmission that is inverted."
+        )
     own = [*system.parameters[: len(system.parameters) - m]]
     expressions = {item.name: as_sympy(item.expression) for item in system.outputs}
     units = {item.name: item.unit for item in system.coordinates}

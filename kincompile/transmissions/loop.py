@@ -18,13 +18,15 @@ from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.ir.redundancy import missing_drivers, rank_report
 from kincompile.model.equation import Equation
-from kincompile.model.inputs import input_name, with_inputs
+from kincompile.model.inputs import input_name, input_rate, with_inputs
+from kincompile.model.mechanism import system_of
 from kincompile.names import column_name, listed, unknown
 from kincompile.space.points import SpatialPoint
 from kincompile.space.primitives import Dot1
 from kincompile.structure.rank import ANGLES_FIRST, DEPENDENT, drivers_of
 from kincompile.structure.remedies import advice
 from kincompile.tables import counted
+from kincompile.transmissions.twists import require_linear, twists_in, with_spins
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,6 +58,10 @@ class Loop:
         Coordinates and outputs of the system, the components of points one by one.
     held : tuple of str
         Freedoms that no output sees: coordinates, and ``"spin of rod"`` of a body in space.
+    twists : tuple of str
+        Outputs that are velocities, as ``"omega_x_foot"``: linear in the rates of the inputs.
+    rates : tuple of str
+        The parameters that these are, before the others, where there are twists.
     """
 
     system: ConstraintSystem
@@ -63,10 +69,16 @@ class Loop:
     parameters: tuple[str, ...]
     outputs: tuple[str, ...]
     held: tuple[str, ...]
+    twists: tuple[str, ...] = ()
+    rates: tuple[str, ...] = ()
 
 
 def loop_of(
-    model: Mechanism | ConstraintSystem, inputs: Sequence[str], outputs: Sequence[str]
+    model: Mechanism | ConstraintSystem,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    *,
+    moving: bool = False,
 ) -> Loop:
     """Return a mechanism as a function of its inputs.
 
@@ -78,7 +90,9 @@ def loop_of(
         Names of drivers, or of other constraints that have a value, and of coordinates, as
         ``"phi_crank"`` or ``"crank.phi"``.
     outputs
-        Names of coordinates, outputs and points.
+        Names of coordinates, outputs, points and angular velocities, ``"omega_x_foot"``.
+    moving
+        Whether the rates of inputs are parameters too, where an output is a velocity.
 
     Raises
     ------
@@ -88,10 +102,14 @@ def loop_of(
         If a name is unknown, something depends on time, the inputs are not as many as the degrees
         of freedom, or do not determine an output.
     """
-    system, names = with_inputs(model, inputs)
+    system = with_spins(system_of(model), list(map(str, outputs)))
     columns = _columns(system, outputs)
+    twists = twists_in(system, columns)
+    is_moving = moving and bool(twists)
+    system, names = with_inputs(system, inputs, moving=is_moving)
     program = lower(system)
     ranks = rank_report(system, program)
+    require_linear(system, program, twists, ranks.state)
     matrix = interpret(program, ranks.state[0], 0 * ranks.state[0], ranks.state[1])[1][0]
     _require_freedoms(system, names, matrix * ranks.scale)
     held: tuple[str, ...] = ()
@@ -99,7 +117,8 @@ def loop_of(
         _require_determined(system, program, ranks, names, columns)
         held, more = _holding(system, ranks)
         system = system.rewritten(system.constraints, more)
-    return Loop(system, names, tuple(map(input_name, names)), columns, held)
+    parameters, rates = (tuple(map(own, names)) for own in (input_name, input_rate))
+    return Loop(system, names, parameters, columns, held, twists, rates if is_moving else ())
 
 
 def _columns(system: ConstraintSystem, outputs: Sequence[str]) -> tuple[str, ...]:

@@ -164,6 +164,23 @@ def test_an_input_that_is_no_number_is_not_finite(run):
     assert back.status == CONVERGED
 
 
+def test_angular_velocities_have_slopes_and_no_value(target, tmp_path, quick_compiler):
+    """omega = e_y pitch_dot + Ry(pitch) e_x roll_dot, by hand."""
+    spins = [f"omega_{axis}_foot" for axis in "xyz"]
+    wanted = ["left", "right"], ["pitch", "roll", *spins]
+    files = kc.emit(models.ankle(), target, transmission=wanted)
+    poses = joined("T3-SPU")
+    calls = [start(), *(go(*x["u"]) for x in poses)]
+    _, *found = called(target, files, calls, [0.0, 0.0, 1.0, 2.0, 3.0], tmp_path, quick_compiler)
+    for here, pose in zip(found, poses, strict=True):
+        pitch, _ = pose["x"]
+        by_hand = np.array([[0, math.cos(pitch)], [1, 0], [0, -math.sin(pitch)]]) @ pose["J"]
+        assert here.status == CONVERGED
+        assert np.isnan(here.x).tolist() == [False, False, True, True, True]
+        np.testing.assert_allclose(here.J[2:], by_hand, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(here.effort, by_hand.T @ [1, 2, 3], rtol=1e-9)
+
+
 @LONG
 def test_rods_that_spin_give_what_distances_give(target, tmp_path, quick_compiler):
     wanted = (["left", "right"], ["pitch", "roll"])

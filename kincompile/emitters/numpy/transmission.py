@@ -64,7 +64,7 @@ def files(of: Transmission) -> Mapping[str, str]:
         "size": repr(of.of.size),
         "statuses": "\n".join(f"{x} = _{x} = {n}" for x, n in statuses().items()),
         "constants": "\n".join(constants),
-        "has_pi": re.search(r"\bpi\b", text) is not None,
+        "of_math": [x for x in ("pi", "nan") if re.search(rf"\b{x}\b", text)],
         "tables": splines,
         "spline": parts["spline"] if splines else "",
         "elementary": parts["elementary"].partition("\n\n\n")[2],

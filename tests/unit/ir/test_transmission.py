@@ -58,11 +58,37 @@ def test_a_chain_without_a_loop_has_nothing_to_solve():
     assert [row[0] for row in slopes] == pytest.approx([-x[1], x[0]], abs=1e-15)
 
 
-def test_outputs_of_velocities_are_refused():
+def test_a_velocity_has_the_slopes_of_its_place_and_no_value():
     m = models.five_bar()
     m.output("drift", rate(m.system().body_points[0].x), "m/s")
-    with pytest.raises(kc.InputError, match="'drift' of five_bar reads velocities"):
-        code_of(m, ["motor_1", "motor_2"], ["drift"])
+    module: dict[str, Any] = {}
+    wanted = ["motor_1", "motor_2"], ["x_end", "drift"]
+    exec(compile(kc.emit(m, transmission=wanted).source, "five_bar", "exec"), module)
+    state, _ = module["start"]()
+    x, slopes, status = module["transmission"](state, [2.2, 1.0])
+    assert status == 0
+    assert x[1] != x[1]
+    assert slopes[1] == pytest.approx(slopes[0], rel=1e-13)
+    f = kc.transmission(m, *wanted)
+    assert f.J([2.2, 1.0])[1] == pytest.approx(slopes[0], rel=1e-10)
+    assert f.second([2.2, 1.0])[1] == pytest.approx(f.second([2.2, 1.0])[0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "output",
+    [
+        lambda x, y: sympy.sqrt(rate(x) ** 2 + rate(y) ** 2),
+        lambda x, y: rate(x) + 1,
+        lambda x, y: rate(rate(x)),
+    ],
+)
+def test_what_is_not_linear_in_velocities_is_refused(output):
+    m = models.five_bar()
+    end = m.system().body_points[0]
+    m.output("drift", output(end.x, end.y), "1")
+    for call in (code_of, kc.transmission):
+        with pytest.raises(kc.InputError, match="'drift' of five_bar reads velocities and is not"):
+            call(m, ["motor_1", "motor_2"], ["drift"])
 
 
 @pytest.mark.parametrize("beside", [{"form": "grouped"}, {"dynamics": True}])

@@ -96,6 +96,65 @@ def test_that_bodies_whose_spin_is_held_give_the_same_function(ankle):
     np.testing.assert_allclose(full.J(-u[:5]), -ankle.J(u[:5]), rtol=1e-9)
 
 
+SPINS = [f"omega_{axis}_foot" for axis in ("x", "y", "z", "xi", "eta", "zeta")]
+
+
+def spins_by_hand(x):
+    """Return omega = e_y p + Ry e_x r by the rates of pitch and roll, and about the foot's axes."""
+    (c, s), (cr, sr) = ((np.cos(a), np.sin(a)) for a in x.T)
+    zero, one = np.zeros(len(x)), np.ones(len(x))
+    axes = np.array([[zero, c], [one, zero], [zero, -s], [zero, one], [cr, zero], [-sr, zero]])
+    return np.moveaxis(axes, -1, 0)
+
+
+def test_that_an_angular_velocity_has_a_jacobian_and_no_value(ankle):
+    f = kc.transmission(models.ankle(), ["left", "right"], ["roll", *SPINS])
+    assert f.twists == tuple(SPINS)
+    assert "velocities, without x: omega_x_foot" in f.to_text()
+    u = 0.2251 + np.random.default_rng(4).uniform(-0.01, 0.01, (20, 2))
+    slopes = spins_by_hand(ankle(u)) @ ankle.J(u)
+    np.testing.assert_allclose(f.J(u)[:, 1:], slopes, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(f.J(u)[:, 0], ankle.J(u)[:, 1], rtol=1e-10)
+    np.testing.assert_allclose(f.effort(u, [0, 1, 0, 0, 0, 0, 0]), slopes[:, 0], atol=1e-10)
+    found = f.at(u[0])
+    assert np.isnan(found.x).tolist() == [False] + [True] * 6
+    assert found.success
+
+
+@pytest.mark.slow
+def test_that_an_angular_velocity_has_an_acceleration(ankle):
+    """Its J is no gradient: derivatives of J are not symmetric."""
+    f = kc.transmission(models.ankle(), ["left", "right"], ["omega_x_foot", "omega_eta_foot"])
+    u = 0.2251 + np.random.default_rng(4).uniform(-0.01, 0.01, (20, 2))
+    u_dot, u_ddot = np.array([0.08, -0.05]), np.array([0.6, 0.9])
+    x, (x_dot, x_ddot) = ankle(u), ankle.rates(u, u_dot, u_ddot)
+    (pitch, roll), (p, r), (p2, r2) = x.T, x_dot.T, x_ddot.T
+    omega, alpha = f.rates(u, u_dot, u_ddot)
+    np.testing.assert_allclose(omega, np.transpose([np.cos(pitch) * r, np.cos(roll) * p]))
+    by_hand = [
+        np.cos(pitch) * r2 - np.sin(pitch) * p * r,
+        np.cos(roll) * p2 - np.sin(roll) * r * p,
+    ]
+    np.testing.assert_allclose(alpha, np.transpose(by_hand), rtol=0, atol=1e-8)
+    apart = (f.second(u) - f.second(u).swapaxes(-1, -2))[:, 0, 0, 1]
+    np.testing.assert_allclose(apart, np.sin(pitch) * np.linalg.det(ankle.J(u)), atol=1e-8)
+
+
+def test_that_velocities_have_no_inverse_and_no_derivatives_by_parameters():
+    m = models.five_bar()
+    m.point("other", "rod_2", (m.parameter("length", 0.1, "m"), 0))
+    m.output("drift", kc.outputs.rate(m.system().body_points[0].x), "m/s")
+    f = kc.transmission(m, ["motor_1", "motor_2"], ["y_end", "drift"])
+    with pytest.raises(kc.InputError, match="velocities among its outputs, drift, which no pos"):
+        f.inverse([0.0, 0.0])
+    assert len(f.assemblies([2.3, 0.9])) == 2
+    with pytest.raises(kc.InputError, match="has no velocities: leave out drift"):
+        kc.derivation(m, transmission=(["motor_1", "motor_2"], ["drift"]))
+    assert np.isnan(f.by([2.3, 0.9], "length")[1]).all()
+    with pytest.raises(kc.InputError, match="has no parameter 'v_motor_1'"):
+        f([2.3, 0.9], p={"v_motor_1": 1.0})
+
+
 def test_that_left_and_right_mirror_each_other(ankle):
     u = np.array([0.21, 0.22])
     sides = np.diag([1, -1])
