@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 LESSONS = tuple(path.stem for path in sorted((DOCS / "course").glob("[0-9]_*.md")))
 
+MUSEUM = "museum"
+"""The lesson without a mechanism of its own: mistakes of real Jacobians."""
+
 MODEL = re.compile(r"^<!-- file: (\S+) -->\n```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 LIVE = re.compile(r"^<!-- live: \w+ -->$", re.MULTILINE)
 """Where a lesson shows its mechanism in motion."""
@@ -89,6 +92,9 @@ def make(arguments: list[str]) -> None:
     given = parser.parse_args(arguments)
     for lesson in LESSONS:
         _write_lesson(given.folder / lesson, lesson, given.students, given.seed)
+    folder, model = given.folder / MUSEUM, model_of(LESSONS[-1])
+    write(folder, {"slides.html": slides(MUSEUM)})
+    kc.exercise(model, given.students, given.seed, mistakes=True).write(folder / "exercise")
     write(given.folder, {"index.html": _index()})
 
 
@@ -139,16 +145,19 @@ def _image(match: re.Match[str]) -> str:
 def _index() -> str:
     """Return the page that links what the kit has."""
     style = (DOCS / "static" / "slides.css").read_text(encoding="utf-8")
-    body = "\n".join(_entry(lesson) for lesson in LESSONS)
+    body = "\n".join(_entry(lesson) for lesson in (*LESSONS, MUSEUM))
     return PAGE.format(title="Course", style=style, body=f"<main><h1>Course</h1>{body}</main>")
 
 
 def _entry(lesson: str) -> str:
-    links = {
-        "slides.html": "slides",
-        "live.html": "live",
-        "derivation.slides.html": "derivation as slides",
-        "derivation.html": "derivation",
+    links = {"slides.html": "slides"}
+    if lesson != MUSEUM:
+        links |= {
+            "live.html": "live",
+            "derivation.slides.html": "derivation as slides",
+            "derivation.html": "derivation",
+        }
+    links |= {
         "exercise/students/01/exercise.html": "exercise of student 01",
         "exercise/instructor/solutions.html": "solutions",
     }

@@ -151,7 +151,7 @@ def _in_turn(faults: Iterable[Fault[sympy.Expr]], random: Random) -> Iterator[Fa
 
 def _plain(entry: sympy.Expr) -> sympy.Expr:
     """Return an entry with whole numbers as one writes them, 2 for 2.0."""
-    whole = {x: sympy.Integer(int(x)) for x in entry.atoms(sympy.Float) if x == int(x)}
+    whole = {x: sympy.Integer(int(x)) for x in entry.atoms(sympy.Float) if float(x).is_integer()}
     plain: sympy.Expr = entry.xreplace(whole)
     return plain
 

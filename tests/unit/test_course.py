@@ -20,6 +20,15 @@ def test_that_there_are_four_lessons_from_a_sketch_to_a_lock_up():
         assert [item for item in headings if item in wanted] == wanted
 
 
+def test_that_the_museum_has_slides_and_answers():
+    text = course.text_of(course.MUSEUM)
+    assert course.slides(course.MUSEUM).count("<section>") == text.count("\n## ") + 1
+    questions, answers = text.split("## Questions")[1].split("## Answers")
+    assert len(re.findall(r"^\d+\.", questions, re.M)) == len(re.findall(r"^\d+\.", answers, re.M))
+    cases = re.findall(r"^## \d+\. .*\n\n\*(.*?)\*", text, re.MULTILINE)
+    assert len(cases) == 8  # each with where it came from
+
+
 @LESSONS
 def test_that_slides_are_one_file_with_a_slide_for_each_heading(lesson):
     page = course.slides(lesson)
@@ -40,8 +49,9 @@ def test_that_the_kit_is_whole_and_its_links_lead_somewhere(tmp_path):
     course.make([str(tmp_path / "course"), "--students", "2", "--seed", "5"])
     index = tmp_path / "course" / "index.html"
     links = re.findall(r'href="([^"]+)"', index.read_text(encoding="utf-8"))
-    assert len(links) == 6 * len(course.LESSONS)
+    assert len(links) == 6 * len(course.LESSONS) + 3
     assert [link for link in links if not (index.parent / link).is_file()] == []
+    assert "P1" in str(kc.mark(index.parent / course.MUSEUM / "exercise"))
     for lesson in course.LESSONS:
         (model,) = (index.parent / lesson).glob("*.py")
         assert kc.read_model(model).name == model.stem

@@ -44,6 +44,8 @@ def test_that_one_entry_is_wrong_and_shows_it(kit: Any) -> None:
         system = variant.system()
         assert len(slips) == 3
         for item in slips:
+            numbers_in = {x for entry in item.rows.values() for x in entry.atoms(sympy.Float)}
+            assert not any(float(x).is_integer() for x in numbers_in)  # 1.0 would catch the eye
             (first,) = (
                 k for k, x in enumerate(system.constraints) if x.name == item.entry.constraint
             )
