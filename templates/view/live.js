@@ -8,7 +8,7 @@
 // As in kincompile/view/drawing.py: the mechanism's diagonal, and how far a guide is longer than the motion, in sizes of marks.
 const PARTS = 50;
 const OVERHANG = 3;
-const REST = 120;  // milliseconds without a pull after which what takes longer is looked for
+const WARM = 120;  // milliseconds after which a page that rests solves once
 
 /* ---- drawing: numbers that depend on parameters or on the motion ---- */
 
@@ -185,7 +185,7 @@ const live = {
     setNumbers(player.data.drawing, this.given);
     this.fit();
     this.readFragment();
-    setTimeout(() => this.motionNow(), REST);  // the first pull is not the first solve: that takes longer
+    setTimeout(() => this.motionNow(), WARM);  // the first pull is not the first solve: that takes longer
     addEventListener('hashchange', () => this.readFragment());
   },
 
@@ -247,13 +247,13 @@ const live = {
     data.parameters.forEach((parameter, k) => { parameter.value = this.values[k]; });
     this.isChanged = true;
     this.motion = this.values.every((value, k) => value === this.given[k]) ? null : this.solved(this.values);
-    clearTimeout(this.timer);
     Object.assign(data, this.made);
     setNumbers(data.drawing, this.values);
     if (this.motion) {
+      // What ended it is looked for first: the status of the point says so.
+      const event = emitted.solver.explain(this.motion);
       this.takeMotion(this.motion);
-      this.takeVerdict(null);
-      this.timer = setTimeout(() => this.explain(), REST);
+      this.takeVerdict(event);
     }
     this.showVerdict();
     this.showValues();
@@ -288,14 +288,6 @@ const live = {
   showVerdict() {
     this.verdict.textContent = player.data.message;
     this.verdict.classList.toggle('failed', !player.data.success);
-  },
-
-  /* Find out what ended the motion: that takes longer than a frame. */
-  explain() {
-    this.takeVerdict(emitted.solver.explain(this.motion));
-    this.showVerdict();
-    player.data.status = Array.from(this.motion.status);
-    if (player.data.events.length) player.motionChanged();
   },
 
   /* ---- a motion to compare with ---- */

@@ -18,8 +18,6 @@ SOLVED = """values => new Promise(resolve => {
 })"""
 """Set values, and wait until they are solved with."""
 
-EXPLAINED = "live.timer !== undefined && (live.explain(), true)"
-
 
 @pytest.fixture(scope="module")
 def open_page(
@@ -216,7 +214,6 @@ def test_that_a_lock_up_is_shown_in_the_words_of_the_solver(open_page: Callable[
     page = open_page(model)
     values = {"a": 2.4}  # no crank turns around
     page.evaluate(SOLVED, values)
-    page.evaluate(EXPLAINED)
     solution = solved_again(page, model, values)
     assert solution.events[-1].kind == "lock-up"
     first = int(np.argmax(solution.status != 0))
@@ -235,6 +232,20 @@ def test_that_a_lock_up_is_shown_in_the_words_of_the_solver(open_page: Callable[
     page.evaluate("player.setIndex(60)")
     assert "Shown is the last position that was found." in page.inner_text("#note")
     assert page.locator("#marks .failed").count() == 1
+    page.close()
+
+
+def test_that_a_lock_up_is_one_as_soon_as_it_is_shown(open_page: Callable[..., Any]) -> None:
+    page = open_page(crank_rocker("at_once"))
+    seen = page.evaluate(
+        """values => new Promise(resolve => {
+          player.onMotion(() => resolve([player.data.status, player.data.events.length]));
+          live.set(values);
+        })""",
+        {"a": 2.4},
+    )
+    assert set(seen[0]) == {0, 4, 7}  # converged, not reached, the lock-up
+    assert seen[1] == 1
     page.close()
 
 
