@@ -12,9 +12,8 @@ from kincompile.criteria import OTHER_SIZE, RESIDUAL_FACTOR, SMALL_ERROR, TOO_NE
 from kincompile.names import listed
 from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense, Sparse
 from kincompile.runtime.engine.scales import Point
-from kincompile.runtime.grid import CORRECTIONS_ON_GRID, solve_grid
-from kincompile.runtime.march import March, Outcome, State
-from kincompile.runtime.problem import problem
+from kincompile.runtime.grid import solve_grid
+from kincompile.runtime.march import CORRECTIONS_ON_GRID, March, Outcome, State
 from kincompile.runtime.singular.events import (
     DOUBTS,
     ended,
@@ -293,8 +292,7 @@ class _Continuation:
     ) -> March:
         """Return the march of the mechanism, whose scales are those at a position."""
         inputs, time = self._inputs, float(self._times[0]) if t is None else t
-        equations = problem(inputs.code, inputs.p, q, time, sparse=True, engine=engine)
-        return March(equations, equations.engine, inputs.tolerance)
+        return March.at(inputs.code, inputs.p, q, time, inputs.tolerance, engine)
 
     def _leave_blocks(self, q: NDArray[np.float64]) -> None:
         """Solve dense matrices from here on: they have the last word."""

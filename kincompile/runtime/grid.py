@@ -15,28 +15,20 @@ determinant of every block of Phi_q kept its sign.
 from __future__ import annotations
 
 import itertools
-import math
-from dataclasses import dataclass
-from operator import mul, sub
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.criteria import (
-    KINK_UNSEEN,
-    LARGEST_DISPLACEMENT,
     LARGEST_ERROR,
     LARGEST_STRIDE,
-    LAST_COARSE_CORRECTION,
     LEAST_STRIDE,
-    MAX_CORRECTIONS,
     NOISE,
     SMALLEST_DETERMINANT,
-    SMOOTH_UNSEEN,
     TARGET_ERROR,
 )
 from kincompile.runtime.engine.linear import Planned
-from kincompile.runtime.march import March, largest
+from kincompile.runtime.march import March, Node, coarse_step
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,15 +36,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.runtime.engine.code import Array
-    from kincompile.runtime.engine.linear import Lanes
     from kincompile.runtime.march import State
 
 BLOCK = 45_000
 """Coordinates of points at a time: enough for the cost of a call not to count, few enough for the
 intermediate arrays to stay in the cache."""
-
-CORRECTIONS_ON_GRID = 2
-"""Newton corrections of every point."""
 
 SMALLEST_STEP_COUNT = 8
 """No coarse step is longer than this part of the grid."""
@@ -90,7 +78,7 @@ def solve_grid(
         start = floats.evaluate(q, float(times[0]))
         floats.factor(start)
         determinants = list(start.factors[1])
-    node = _Node(0, q, q_dot, q_ddot, determinants)
+    node = Node(0, q, q_dot, q_ddot, determinants)
     nodes = _coarse_march(floats, node, times, (1 / reference).tolist())
     reached = nodes[-1].index + 1
     _interpolate(nodes, times[:reached], states[0])
@@ -101,25 +89,14 @@ def solve_grid(
     edges = np.linspace(0, reached, parts + 1).astype(int).tolist()
     for start, stop in itertools.pairwise(edges):
         part = slice(start, stop)
-        found = states[..., part], residual[part], good[part]
-        _solve_block(batch, times[part], *found, smallest)
+        found = states[..., part], residual[part]
+        good[part] = batch.solve_together(times[part], *found, smallest)
     return len(nodes)
 
 
-@dataclass(frozen=True, slots=True)
-class _Node:
-    """A point of the coarse march: its number in the time grid, and floats."""
-
-    index: int
-    q: Lanes
-    q_dot: Lanes
-    q_ddot: Lanes
-    determinants: Lanes
-
-
 def _coarse_march(
-    engine: Planned, first: _Node, times: Array, per_scale: Sequence[float]
-) -> list[_Node]:
+    engine: Planned, first: Node, times: Array, per_scale: Sequence[float]
+) -> list[Node]:
     """Follow the motion over a time grid in as few steps as the prediction allows.
 
     Returns nodes from `first` to the last point of the grid, or to the last that could be trusted.
@@ -131,7 +108,7 @@ def _coarse_march(
         node = nodes[-1]
         index = min(node.index + stride, last)
         try:
-            step = _coarse_step(engine, node, index, times, per_scale)
+            step = coarse_step(engine, node, index, times, per_scale)
         except (ArithmeticError, ValueError):
             step = None
         error = LARGEST_ERROR * 8 if step is None else step[1]
@@ -145,41 +122,7 @@ def _coarse_march(
     return nodes
 
 
-def _coarse_step(
-    engine: Planned, node: _Node, index: int, times: Array, per_scale: Sequence[float]
-) -> tuple[_Node, float] | None:
-    """Return the point at `index` and the error of its prediction; None without convergence."""
-    t = float(times[index])
-    h = t - float(times[node.index])
-    half = 0.5 * h
-    predicted = [
-        x + h * (v + half * a) for x, v, a in zip(node.q, node.q_dot, node.q_ddot, strict=True)
-    ]
-    q: Any = predicted
-    for _ in range(MAX_CORRECTIONS):
-        point = engine.evaluate(q, t)
-        correction = engine.solve(point, point.Phi)
-        q = list(map(sub, q, correction))
-        if max(map(abs, map(mul, correction, per_scale))) <= LAST_COARSE_CORRECTION:
-            break
-    else:
-        return None
-    point.q = q
-    _, q_dot, _, q_ddot = engine.velocity_and_acceleration(point)
-    determinants = point.factors[1]
-    if not math.isfinite(sum(q_ddot)):
-        return None
-    if any(x * y <= 0 for x, y in zip(determinants, node.determinants, strict=True)):
-        return None
-    error = max(map(abs, map(mul, map(sub, q, predicted), per_scale)))
-    rates = zip(q_dot, node.q_dot, node.q_ddot, per_scale, strict=True)
-    kink = abs(h) * max([abs(w - v - h * a) * s for w, v, a, s in rates])
-    if kink > KINK_UNSEEN * (error + SMOOTH_UNSEEN):
-        return None
-    return _Node(index, q, q_dot, q_ddot, determinants), error
-
-
-def _interpolate(nodes: list[_Node], times: Array, q: Array) -> None:
+def _interpolate(nodes: list[Node], times: Array, q: Array) -> None:
     """Write the Hermite polynomials of fifth degree between the nodes into q, shape (n, N)."""
     index = np.array([node.index for node in nodes])
     at = times[index]
@@ -198,23 +141,3 @@ def _interpolate(nodes: list[_Node], times: Array, q: Array) -> None:
     ):
         np.matmul(between, basis[:, start:stop], out=q[:, start:stop])
     q[:, nodes[-1].index] = nodes[-1].q
-
-
-def _solve_block(
-    march: March,
-    t: Array,
-    states: Array,
-    residual: Array,
-    trusted: NDArray[np.bool_],
-    smallest: Array,
-) -> None:
-    """Correct a block of interpolated positions twice, and solve for velocity and acceleration."""
-    engine, (q, q_dot, q_ddot) = march.engine, states
-    assert isinstance(engine, Planned)
-    found = march.correct_together(q, t, CORRECTIONS_ON_GRID, LARGEST_DISPLACEMENT)
-    point, good = found.point, found.good
-    residual[:] = largest(point.Phi, t.size)
-    rates = engine.rates(point, None, (q_dot, q_ddot))
-    for values, least in zip(point.factors[1], smallest, strict=True):
-        good = good & (values / least > 1)
-    trusted[:] = good & engine.meet(march.equations, point, rates)

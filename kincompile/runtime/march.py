@@ -11,8 +11,10 @@ step is halved, and doubled again once it succeeds.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import partial
+from operator import mul, sub
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +28,10 @@ from kincompile.criteria import (
     GROWN,
     GROWTH,
     KINK,
+    KINK_UNSEEN,
     LARGE_ERROR,
+    LARGEST_DISPLACEMENT,
+    LAST_COARSE_CORRECTION,
     LAST_CORRECTION,
     LEFT,
     MAX_CORRECTIONS,
@@ -41,21 +46,25 @@ from kincompile.criteria import (
     SMALL_ERROR,
     SMALLEST_PART,
     SMOOTH,
+    SMOOTH_UNSEEN,
     SOON,
     TINY,
     TOO_NEAR,
 )
-from kincompile.runtime.engine.linear import Dense, unsolvable
+from kincompile.runtime.engine.linear import Dense, Planned, unsolvable
 from kincompile.runtime.engine.scales import Point, column, within
-from kincompile.runtime.problem import iterate, plain_step
+from kincompile.runtime.problem import iterate, plain_step, problem
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
-    from kincompile.runtime.engine.code import Array
-    from kincompile.runtime.engine.linear import Linear
+    from kincompile.runtime.engine.code import Array, Compiled
+    from kincompile.runtime.engine.linear import Lanes, Linear
     from kincompile.runtime.problem import Attempt, Problem
+
+CORRECTIONS_ON_GRID = 2
+"""Newton corrections of every point of a grid."""
 
 SIGN_OF_LIFE = 256
 """Sub-steps between two times after which progress is shown."""
@@ -120,6 +129,15 @@ class March:
         # Factors of Phi_q a rounding error away serve the rates; a dense matrix has none to save.
         self._tight = 0.0 if isinstance(engine, Dense) else min(tolerance, LAST_CORRECTION)
         self._step = partial(plain_step, tight=self._tight) if self._tight else plain_step
+
+    @classmethod
+    def at(
+        cls, code: Compiled, p: Array, q: Array, t: float, tolerance: float,
+        engine: Linear | None = None,
+    ) -> March:  # fmt: skip
+        """Return the march of a mechanism, whose scales are those at a position."""
+        equations = problem(code, p, q, t, sparse=True, engine=engine)
+        return cls(equations, equations.engine, tolerance)
 
     @property
     def scales(self) -> tuple[float, float]:
@@ -257,6 +275,22 @@ class March:
         is_far = following.sensitivity <= TOO_NEAR
         return following, all_hold(found.good & near & is_far, checks), found.iterations
 
+    def solve_together(self, t: Array, states: Array, residual: Array, smallest: Array) -> Any:
+        """Correct interpolated positions (n, N) twice, and solve for velocity and acceleration.
+
+        All in place, `states` (3, n, N); returns which points can be trusted, whose determinants
+        keep their signs and are larger than the `smallest`.
+        """
+        engine, (q, q_dot, q_ddot) = self.engine, states
+        assert isinstance(engine, Planned)
+        found = self.correct_together(q, t, CORRECTIONS_ON_GRID, LARGEST_DISPLACEMENT)
+        point, good = found.point, found.good
+        residual[:] = largest(point.Phi, t.size)
+        rates = engine.rates(point, None, (q_dot, q_ddot))
+        for values, least in zip(point.factors[1], smallest, strict=True):
+            good = good & (values / least > 1)
+        return good & engine.meet(self.equations, point, rates)
+
     def lock_up(self, begin: State, state: State, t: Any, smallest: Any) -> Any:
         """Say of a batch that cannot be taken on by its smallest step where it is at a lock-up.
 
@@ -382,3 +416,48 @@ def all_within(values: Iterable[Array], limits: Array) -> bool:
     """
     rows = zip(values, limits.ravel().tolist(), strict=True)
     return all(np.dot(row, row) <= limit * limit for row, limit in rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A point of the coarse march: its number in the time grid, and floats."""
+
+    index: int
+    q: Lanes
+    q_dot: Lanes
+    q_ddot: Lanes
+    determinants: Lanes
+
+
+def coarse_step(
+    engine: Planned, node: Node, index: int, times: Array, per_scale: Sequence[float]
+) -> tuple[Node, float] | None:
+    """Return the point at `index` and the error of its prediction; None without convergence."""
+    t = float(times[index])
+    h = t - float(times[node.index])
+    half = 0.5 * h
+    predicted = [
+        x + h * (v + half * a) for x, v, a in zip(node.q, node.q_dot, node.q_ddot, strict=True)
+    ]
+    q: Any = predicted
+    for _ in range(MAX_CORRECTIONS):
+        point = engine.evaluate(q, t)
+        correction = engine.solve(point, point.Phi)
+        q = list(map(sub, q, correction))
+        if max(map(abs, map(mul, correction, per_scale))) <= LAST_COARSE_CORRECTION:
+            break
+    else:
+        return None
+    point.q = q
+    _, q_dot, _, q_ddot = engine.velocity_and_acceleration(point)
+    determinants = point.factors[1]
+    if not math.isfinite(sum(q_ddot)):
+        return None
+    if any(x * y <= 0 for x, y in zip(determinants, node.determinants, strict=True)):
+        return None
+    error = max(map(abs, map(mul, map(sub, q, predicted), per_scale)))
+    rates = zip(q_dot, node.q_dot, node.q_ddot, per_scale, strict=True)
+    kink = abs(h) * max([abs(w - v - h * a) * s for w, v, a, s in rates])
+    if kink > KINK_UNSEEN * (error + SMOOTH_UNSEEN):
+        return None
+    return Node(index, q, q_dot, q_ddot, determinants), error

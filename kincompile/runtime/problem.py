@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -56,6 +56,11 @@ class Problem(Scales):
 
     engine: Linear  # what solves them
     p: Array  # (k,): parameters
+
+    def with_functions(self, **functions: Any) -> Problem:
+        """Return equations with other functions than those of their module."""
+        code = replace(self.code, lanes=None, blocks=(), **functions)
+        return replace(self, code=code, engine=Dense(code, self.p))
 
     def at(self, q: Array, t: float) -> Point | None:
         """Evaluate the equations, or give None where they have no finite value."""

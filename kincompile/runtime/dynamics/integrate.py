@@ -9,7 +9,6 @@ where they are given out. Implicit methods get the derivatives of the rates.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,28 +76,6 @@ COLUMNS = (
 """Arrays with an entry for each point."""
 
 
-class Stepper(ABC):
-    """An integrator that goes from step to step."""
-
-    problem = ""  # why it can go no further; "" as long as it can
-    # t, y: time and state after the last step
-    t: float
-    y: Array
-    length: float  # how long the next step is meant to be
-
-    @abstractmethod
-    def step(self, longest: float) -> None:
-        """Take a step, no longer than this and not beyond the last time."""
-
-    @abstractmethod
-    def between(self) -> Callable[[float], Array]:
-        """Return the states within the last step."""
-
-    def put(self, y: Array) -> None:
-        """Go on from another state, where there is no history."""
-        del y
-
-
 def stepper(
     method: str,
     rates: tuple[Rate, Rate],
@@ -116,12 +93,19 @@ def stepper(
     """
     if method not in METHODS:
         raise InputError(f"method is {method!r}: give one of {', '.join(METHODS)}.")
-    make: type[_OneStep | _Multistep] = _Multistep if method == "CVODE" else _OneStep
+    make = _Multistep if method == "CVODE" else Stepper
     return make(method, rates, t, y, tolerance, max_step, first)
 
 
-class _OneStep(Stepper):
-    """A solver of SciPy."""
+class Stepper:
+    """An integrator that goes from step to step: a solver of SciPy."""
+
+    problem = ""  # why it can go no further; "" as long as it can
+    # t, y: time and state after the last step
+    t: float
+    y: Array
+    length: float  # how long the next step is meant to be
+    _has_history = True
 
     def __init__(
         self, method: str, rates: tuple[Rate, Rate], t: tuple[float, float], y: Array,
@@ -145,6 +129,7 @@ class _OneStep(Stepper):
         self.length = float(min(self._solver.h_abs, self._longest))
 
     def step(self, longest: float) -> None:
+        """Take a step, no longer than this and not beyond the last time."""
         self._solver.max_step = min(self._longest, longest)
         try:
             self._solver.step()
@@ -155,12 +140,13 @@ class _OneStep(Stepper):
         self._read()
 
     def put(self, y: Array) -> None:
+        """Go on from another state, where there is no history."""
         if not self._has_history:
             self.y = self._solver.y = y
             self._solver.f = self._rate(self._solver.t, y)
 
     def between(self) -> Callable[[float], Array]:
-        """Return SciPy's own interpolation."""
+        """Return the states within the last step, by the integrator's own interpolation."""
         found: Callable[[float], Array] = self._solver.dense_output()
         return found
 

@@ -95,9 +95,9 @@ class Linear(ABC):
         Where there are no blocks it is one number, relative to that of a point before.
         """
 
-    @abstractmethod
     def signs(self, point: Point) -> tuple[float, ...]:
         """Return their signs at one point; none where redundant equations forbid a determinant."""
+        return tuple(np.sign(self.determinants(point, point)).ravel().tolist())
 
     def solved(self, scales: Scales, point: Point, extra_rhs: Array | None = None) -> Rates:
         """Return the rates at a point as `rates` does, with where they meet their equations."""
@@ -248,10 +248,6 @@ class Planned(Linear):
         """Return the determinants of the blocks, shape (blocks, N)."""
         self.factor(point)
         return stacked(point.factors[1], point.q.shape[1])
-
-    def signs(self, point: Point) -> tuple[float, ...]:
-        """Return the signs at the first point."""
-        return tuple(np.sign(self.determinants(point)[:, 0]).tolist())
 
 
 @lru_cache(maxsize=16)
@@ -484,7 +480,3 @@ class Sparse(Linear):
         """Return the determinants of the blocks."""
         self.factor(point)
         return self._solver.determinants(point.factors)
-
-    def signs(self, point: Point) -> tuple[float, ...]:
-        """Return the signs of the determinants."""
-        return tuple(np.sign(self.determinants(point, point)).tolist())

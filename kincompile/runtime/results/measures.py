@@ -1,7 +1,7 @@
 r"""Measures of a motion: extremes, dead points, time ratio and mean of every output.
 
 Extremes lie between the points of the grid: where :math:`\dot y` changes its sign, the motion is
-followed from the nearest point (`between.py`, so that the branch is kept), and :math:`\dot y = 0`
+followed from the nearest point (`observed.py`, so that the branch is kept), and :math:`\dot y = 0`
 is solved by Newton's method with :math:`\ddot y`. An integral over a step h is
 that of the polynomial of fifth degree through y and its emitted rates at both ends,
 
@@ -23,9 +23,9 @@ import numpy as np
 from kincompile.criteria import ROOT_LENGTH, SAME, SOLVED, STILL, ZERO
 from kincompile.errors import InputError
 from kincompile.names import column_name, listed, suggestion
-from kincompile.runtime.results.between import ObservedMotion, derivative, together
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.driver_range import DriverRange, driver_ranges, driver_table
+from kincompile.runtime.results.observed import ObservedMotion, derivative, together
 from kincompile.runtime.results.plot import runs
 from kincompile.runtime.singular.curve import zero
 from kincompile.tables import table
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from collections.abc import Container, Sequence
 
     from kincompile.runtime.engine.code import Array, Compiled
-    from kincompile.runtime.results.between import Between
     from kincompile.runtime.results.columns import MotionTable
+    from kincompile.runtime.results.observed import Between
 
 GAUSS_PLACES = 8
 """Places for the integral over a step at whose ends a rate does not exist."""

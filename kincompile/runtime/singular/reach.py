@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.criteria import SAME_POSITION, ZERO
-from kincompile.runtime.engine.linear import Dense
 from kincompile.runtime.march import State
 from kincompile.runtime.problem import nearest
 from kincompile.runtime.singular.assemblies import MOST_COORDINATES
@@ -202,7 +201,7 @@ def _with_the_others(equations: Problem, row: int, q: Array, t: float) -> Point 
         Phi, Phi_q = equations.code.position(q, t, p)
         return rest * Phi, rest[:, np.newaxis] * Phi_q
 
-    attempt = nearest(_with_position(equations, position), t, q)
+    attempt = nearest(equations.with_functions(position=position), t, q)
     return equations.at(attempt.last.q, t) if attempt.status is Status.CONVERGED else None
 
 
@@ -217,19 +216,13 @@ def freed_curve(equations: Problem, row: int, start: Point, t: float) -> tuple[C
         Phi, Phi_q = equations.code.position(q, t, p)
         return Phi - value * unit, Phi_q
 
-    freed = _with_position(equations, position, nu=lambda q, value, p: unit)
+    freed = equations.with_functions(position=position, nu=lambda q, value, p: unit)
     value = float(start.Phi[row])
     point = replace(start, t=value, Phi=start.Phi - value * unit, factors=None)
     nothing = np.zeros(start.q.size)
     state = State(value, point, nothing, nothing, np.ones(1))
     duration = max(abs(value), float(equations.magnitude[row]))
     return Curve(freed, state, duration), state
-
-
-def _with_position(equations: Problem, position: Any, **functions: Any) -> Problem:
-    """Return equations with other functions than those of their module."""
-    code = replace(equations.code, position=position, lanes=None, blocks=(), **functions)
-    return replace(equations, code=code, engine=Dense(code, equations.p))
 
 
 def _extremes(curve: Curve, state: State, direction: float) -> tuple[list[float], bool]:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import ZERO
-from kincompile.runtime.engine.linear import Dense
 from kincompile.runtime.march import State
 from kincompile.runtime.singular.curve import Curve
 from kincompile.runtime.singular.events import event_of
@@ -164,24 +163,17 @@ class Path:
     def _system(self) -> Problem:
         """Return the equations of equilibrium as those of a mechanism."""
         equations, added = self.balance.equations, np.ones(len(self._rows))
-        code = replace(
-            equations.code,
-            coordinates=(
-                *equations.code.coordinates,
-                *(f"lambda_{k}" for k, _ in enumerate(added)),
-            ),
+        ones = np.ones(equations.place.size + added.size)
+        names = (f"lambda_{k}" for k, _ in enumerate(added))
+        system = equations.with_functions(
             position=self._position,
             nu=self._in_time,
-            lanes=None,
-            blocks=(),
+            coordinates=(*equations.code.coordinates, *names),
             redundant=(),
-            pattern=np.argwhere(np.ones((equations.place.size + added.size,) * 2)),
+            pattern=np.argwhere(np.outer(ones, ones)),
         )
-        ones = np.ones(equations.place.size + added.size)
         return replace(
-            equations,
-            code=code,
-            engine=Dense(code, equations.p),
+            system,
             reference=np.concatenate((equations.reference, added)),
             place=np.concatenate((equations.place, 0 * added)),
             magnitude=ones,

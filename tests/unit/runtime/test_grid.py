@@ -5,7 +5,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.runtime import grid as grid_module
+from kincompile.runtime.march import March
 
 
 def both(module, t, **options):
@@ -85,13 +85,14 @@ def test_that_points_that_are_not_trusted_are_marched(example_named, monkeypatch
     module = example_named("four_bar").module
     t = np.linspace(0, 4, 400)
     whole = kc.solve(module, t)
-    solve_block = grid_module._solve_block  # noqa: SLF001 - a fault is put into it
+    solve_together = March.solve_together
 
-    def doubting(march, times, states, residual, good, smallest):
-        solve_block(march, times, states, residual, good, smallest)
+    def doubting(march, times, states, residual, smallest):
+        good = solve_together(march, times, states, residual, smallest)
         good[100:110] = False
+        return good
 
-    monkeypatch.setattr(grid_module, "_solve_block", doubting)
+    monkeypatch.setattr(March, "solve_together", doubting)
     solution = kc.solve(module, t)
     assert solution.success
     assert solution.statistics["marched"] == 10

@@ -10,8 +10,8 @@ import sympy
 import kincompile as kc
 from kincompile import outputs
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.results import between
 from kincompile.runtime.results.measures import measures_together
+from kincompile.runtime.results.observed import ObservedMotion
 
 A, L, START = 0.06, 0.26, 0.3
 
@@ -267,13 +267,13 @@ def test_measures_of_variants_together_are_those_of_each_alone(monkeypatch):
     starts = np.linspace(0, 3, 7)
     several = slider_crank(1.3, 53, start=starts)  # pull has no rate, and speed turns in corners
     looks = []
-    look = between.ObservedMotion.look
+    look = ObservedMotion.look
 
     def counted(motion, t):
         looks.append(t)
         look(motion, t)
 
-    monkeypatch.setattr(between.ObservedMotion, "look", counted)
+    monkeypatch.setattr(ObservedMotion, "look", counted)
     ones = [several.variant(number) for number in range(7)]
     sets = starts[:, np.newaxis]
     code, names = code_of(several.require_module("")), ("travel", "speed", "pull")

@@ -10,7 +10,7 @@ import kincompile as kc
 
 PACKAGE = str(Path(kc.__file__).parent)
 
-RETURNS = 28
+RETURNS = 26
 """How often control may come back to a file that it has been in, by a call or a return: each way
 from one file to another counts once. That is measured. Eleven files need ten, from each back
 to its caller; the others are files that several ask, such as scales and linear systems."""
