@@ -36,10 +36,6 @@ if TYPE_CHECKING:
     Progress: TypeAlias = Callable[[int, int], object]
 
 
-def _by_points() -> dict[str, int]:
-    return {"coarse": 0, "marched": 0}
-
-
 @dataclass(slots=True, eq=False)
 class Motion:
     """A motion while it is being filled, N points and n coordinates; or B, which is the last axis.
@@ -54,7 +50,8 @@ class Motion:
     status: NDArray[np.int64]
     residual: Array
     iterations: NDArray[np.int64]
-    statistics: dict[str, int] = field(default_factory=_by_points)  # points by how they were found
+    # Points by how they were found.
+    statistics: dict[str, int] = field(default_factory=lambda: {"coarse": 0, "marched": 0})
     # events, passed: what happened on the way, and those of it that the motion went through
     events: list[Event] = field(default_factory=list)
     passed: list[Event] = field(default_factory=list)

@@ -62,6 +62,13 @@ class Problem(Scales):
         code = replace(self.code, lanes=None, blocks=(), **functions)
         return replace(self, code=code, engine=Dense(code, self.p))
 
+    def nu(self, q: Array, t: float) -> Array:
+        """Return the right side of the velocity equation, NaN where it has no value."""
+        try:
+            return np.asarray(self.code.nu(q, t, self.p))
+        except (ArithmeticError, ValueError):
+            return np.full(len(self.code.equations), np.nan)
+
     def at(self, q: Array, t: float) -> Point | None:
         """Evaluate the equations, or give None where they have no finite value."""
         point = self.engine.evaluate(q, t)

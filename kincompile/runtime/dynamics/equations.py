@@ -97,7 +97,10 @@ class Equations:
         q, q_dot = y[:n], y[n : 2 * n]
         point, nothing = self.point(q, t), np.full(n + 1, np.nan)
         Q = np.asarray(own.Q(q, q_dot, t, p))
-        if point is None or not np.isfinite(Q).all() or self._is_singular(point):
+        if point is None or not np.isfinite(Q).all():
+            return nothing
+        values = np.linalg.svd(self.scaled(point), compute_uv=False)
+        if (values <= RANK * values[:1]).any():  # independent equations depend on each other there
             return nothing
         Phi_q, size = point.Phi_q[rows], n + rows.size
         matrix = np.zeros((size, size))
@@ -117,14 +120,9 @@ class Equations:
             if not missing[own_rows].max(initial=0.0) <= SOLVED * terms[own_rows].max(initial=0.0):
                 return nothing
         change = np.imag(own.M(q + 1j * COMPLEX_STEP * q_dot, t, p)) / COMPLEX_STEP
-        demanded = found[n:] @ self.nu(q, t)[rows]
+        demanded = found[n:] @ self.joints.nu(q, t)[rows]
         power = Q @ q_dot + q_dot @ change @ q_dot / 2 - demanded
         return np.append(found[:n], power)
-
-    def _is_singular(self, point: Point) -> bool:
-        """Say whether independent equations depend on each other at a position."""
-        values = np.linalg.svd(self.scaled(point), compute_uv=False)
-        return bool((values <= RANK * values[:1]).any())
 
     def held_rate(self, t: float, y: Array) -> Array:
         """Return the rate of a state that is first led back to its constraints; NaN where not.
@@ -181,11 +179,7 @@ class Equations:
 
     def demanded(self, q: Array, t: float) -> Array:
         """Return how fast independent equations demand that movements be, all to one scale."""
-        return np.asarray((self.joints.weights() * self.nu(q, t))[self.independent])
-
-    def nu(self, q: Array, t: float) -> Array:
-        """Return the right side of the velocity equation."""
-        return np.asarray(self.code.nu(q, t, self.parameters))
+        return np.asarray((self.joints.weights() * self.joints.nu(q, t))[self.independent])
 
 
 class _Slopes:

@@ -185,32 +185,18 @@ def _check(inputs: Inputs, rtol: Any, atol: Any, max_step: Any) -> None:
 def _solution(inputs: Inputs, found: Integration) -> Solution:
     """Return the motion, with its energies as columns."""
     code = inputs.code
+    names = ("t", "q", "q_dot", "q_ddot", "status", "residual", "message", "statistics", "events")
     solution = Solution(
-        t=found.t,
-        q=found.q,
-        q_dot=found.q_dot,
-        q_ddot=found.q_ddot,
-        status=found.status,
-        residual=found.residual,
         iterations=found.steps,
         success=bool((found.status == Status.CONVERGED).all()),
-        message=found.message,
-        statistics=found.statistics,
-        events=found.events,
+        **{name: getattr(found, name) for name in names},
         **inputs.about(),
     )
-    energy = _energy_unit(code.units, code.bodies, code.coordinates)
+    length = code.units[code.coordinates[code.bodies[0][1]]] if code.bodies else ""
+    energy = force_units(length)[1].replace("N*m", "J")
     units = dict(zip(ADDED, (energy, energy, energy, ""), strict=True))
     columns = np.stack((found.kinetic, found.work, found.energy_drift, found.drift), axis=-1)
     return solution.observing(solution.observed.joined(ADDED, units, columns))
-
-
-def _energy_unit(
-    units: Mapping[str, str], bodies: tuple[tuple[str, int, int], ...], names: tuple[str, ...]
-) -> str:
-    """Return the unit of energies."""
-    length = units[names[bodies[0][1]]] if bodies else ""
-    return force_units(length)[1].replace("N*m", "J")
 
 
 def given_values(
@@ -283,7 +269,7 @@ def velocity_at(
     asked = 1 / np.where(sizes > 0, sizes, 1.0)
     matrix = np.vstack((weights[:, np.newaxis] * point.Phi_q, asked[:, np.newaxis] * rows)) * scale
     values = np.array(list(given.values()))
-    sides = np.concatenate((weights * equations.nu(q, t), asked * values))
+    sides = np.concatenate((weights * equations.joints.nu(q, t), asked * values))
     sides = sides - matrix @ (near / scale)
     _, sizes, right = np.linalg.svd(matrix)
     rank = int((sizes > RANK * sizes[:1]).sum())

@@ -252,6 +252,11 @@ numbers."""
 MORE = ("kinematics_batch_last", "solve")
 """Functions that are those of no quantity; only some modules have a solve."""
 
+CONSTANTS = (
+    "NAME", "COORDINATES", "EQUATIONS", "PARAMETERS", "UNITS", "DEFAULTS", "GUESS", "PATTERN"
+)  # fmt: skip
+"""Those that every module has, in small letters attributes."""
+
 TYPED = "position", "nu", "gamma", "Phi_q", "M", "Q", "Q_q", "Q_q_dot", "observe", "outputs_q"
 """Functions that are attributes: None where a module without loads or outputs has none."""
 
@@ -305,15 +310,8 @@ def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compi
     observe = lanes.get("observe") if "observe_into" not in names else None
     return Compiled(
         module=module,
-        name=names["NAME"],
-        coordinates=coordinates,
-        equations=names["EQUATIONS"],
-        parameters=names["PARAMETERS"],
+        **{name.lower(): names[name] for name in CONSTANTS},
         outputs=names.get("OUTPUTS", ()),
-        units=names["UNITS"],
-        defaults=names["DEFAULTS"],
-        guess=names["GUESS"],
-        pattern=names["PATTERN"],
         bodies=bodies,
         entries=entries,
         constant=_constant(entries, len(names["EQUATIONS"]), len(coordinates)),

@@ -366,16 +366,12 @@ def conditions(code: Compiled, q: Array, t: Array, p: Array) -> Array:
             part = found[start : start + BLOCK]
             if columns.size <= LARGEST_DENSE or rows.size > columns.size:
                 matrices = code.Phi_q(np.ascontiguousarray(q[part]), t[part], p)
-                result[part] = _of_dense(rows[:, np.newaxis] * matrices * columns)
+                even = rows[:, np.newaxis] * matrices * columns
+                sizes = np.linalg.svd(even, compute_uv=False)
+                result[part] = sizes[:, 0] / sizes[:, -1]
             else:
                 result[part] = [_estimate(code, q[k], t[k], p, rows, columns) for k in part]
     return result
-
-
-def _of_dense(matrices: Array) -> Array:
-    """Return the ratio of the largest and the smallest singular value of each matrix."""
-    sizes = np.linalg.svd(matrices, compute_uv=False)
-    return np.asarray(sizes[:, 0] / sizes[:, -1], dtype=np.float64)
 
 
 def _estimate(code: Compiled, q: Array, t: float, p: Array, rows: Array, columns: Array) -> float:

@@ -182,12 +182,8 @@ def _is_open(inputs: Inputs, q: Vector, without: Sequence[str]) -> bool:
     here, there = (
         np.abs(_difference(equations, x, inputs.guess))[angles].max() for x in (q, other)
     )
-    return bool(there <= 2 * here and _differ(equations, q, other, columns))
-
-
-def _differ(equations: Problem, q: Vector, other: Vector, columns: Sequence[int]) -> bool:
-    """Say whether two positions differ in some of the coordinates."""
-    return bool((np.abs(_difference(equations, q, other))[columns] > SAME_POSITION).any())
+    moved = np.abs(_difference(equations, q, other))[columns]
+    return bool(there <= 2 * here and (moved > SAME_POSITION).any())
 
 
 def _periodic(equations: Problem, t: float, guess: Vector) -> NDArray[np.bool_]:

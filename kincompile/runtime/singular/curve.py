@@ -197,11 +197,8 @@ class Curve:
         point = self.equations.at(q, t)
         if point is None:
             return None
-        try:
-            nu = self.equations.code.nu(q, t, self.equations.p)
-        except (ArithmeticError, ValueError):
-            return None
-        matrix = self._weights[:, np.newaxis] * np.column_stack((point.Phi_q, -nu)) * self.scale
+        slopes = np.column_stack((point.Phi_q, -self.equations.nu(q, t)))
+        matrix = self._weights[:, np.newaxis] * slopes * self.scale
         return (point, matrix) if np.isfinite(matrix).all() else None
 
     def _place(self, q: Vector, t: float, towards: Vector) -> CurvePoint | None:

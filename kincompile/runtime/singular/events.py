@@ -178,10 +178,7 @@ def ended(
 
 def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
     """Tell what a position is from which no motion is known: a lock-up or a bifurcation."""
-    try:
-        nu = equations.code.nu(point.q, t, equations.p)
-    except (ArithmeticError, ValueError):
-        return None
+    nu = equations.nu(point.q, t)
     if not (np.isfinite(nu).all() and np.isfinite(point.Phi_q).all()):
         return None
     weights = equations.weights()

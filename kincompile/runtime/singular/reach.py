@@ -8,7 +8,6 @@ Phi_row(q) = s, the others zero, in q and s together, which `curve` follows.
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -155,8 +154,7 @@ def _driven(equations: Problem, q: Array, t: float) -> NDArray[np.bool_]:
     """Return which equations depend on time, now or soon: a driver may begin at rest."""
     found = np.zeros(q.size, dtype=bool)
     for later in LATER:
-        with suppress(ArithmeticError, ValueError):
-            found |= np.asarray(equations.code.nu(q, t + later, equations.p)) != 0
+        found |= np.abs(equations.nu(q, t + later)) > 0
     return found
 
 
