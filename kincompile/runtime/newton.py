@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
-from kincompile.errors import InputError
 from kincompile.html import Shown
 from kincompile.runtime.engine.scales import norm
 from kincompile.runtime.inputs import read_inputs
@@ -111,10 +110,8 @@ def newton(
         When the equations cannot determine the coordinates: what is wrong, and what to do.
     """
     inputs = read_inputs(module, t, p, q0, tolerance, max_iterations)
-    if inputs.t.size > 1:
-        raise InputError(f"newton works at one time, got {inputs.t.size}: use solve for a grid.")
+    time = inputs.one_time("newton works at one time", "use solve for a grid")
     with np.errstate(all="ignore"):
-        time = float(inputs.t[0])
         equations = problem(inputs.code, inputs.p, inputs.guess, time)
         attempt = assemble(equations, time, inputs.guess, inputs.tolerance, inputs.max_iterations)
     return _result(attempt, inputs.guess)

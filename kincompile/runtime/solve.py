@@ -65,7 +65,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.scales import Point
     from kincompile.runtime.follow import Motion
     from kincompile.runtime.march import Outcome
-    from kincompile.runtime.problem import Problem
     from kincompile.runtime.singular.events import Event
 
 NAMED_TIMES = 6
@@ -418,11 +417,8 @@ def _asked(inputs: Inputs, outcome: Outcome) -> str:
     point = outcome.nearest
     if point is None or outcome.jumps or outcome.status not in UNREACHED:
         return ""
-    return " ".join(impossible(_equations_at(inputs, point), point.q, point.t))
-
-
-def _equations_at(inputs: Inputs, point: Point) -> Problem:
-    return problem(inputs.code, inputs.p, point.q, point.t)
+    equations = problem(inputs.code, inputs.p, point.q, point.t)
+    return " ".join(impossible(equations, point.q, point.t))
 
 
 def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str:
@@ -456,7 +452,7 @@ def _unmet(inputs: Inputs, point: Point) -> str:
     sizes = np.abs(point.Phi)
     order = np.argsort(-sizes, kind="stable")[:NAMED_EQUATIONS]
     rows = [row for row in order.tolist() if sizes[row] > ZERO * sizes[order[0]]]
-    equations = _equations_at(inputs, point)
+    equations = problem(inputs.code, inputs.p, point.q, point.t)
     worst = ", ".join(missed(equations, point, row) for row in rows)
     places = listed(_places(inputs.code, point.q), most=NAMED_BODIES)
     return (
