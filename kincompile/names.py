@@ -221,3 +221,11 @@ def force_units(length: str) -> tuple[str, str, str]:
     if not length:
         return "", "", ""
     return f"kg*{length}/s^2", f"kg*{length}^2/s^2", f"kg*{length}^2/s^3"
+
+
+def transmission_ends(text: str) -> tuple[list[str], list[str]] | None:
+    """Return the names in ``left,right:pitch,roll``, inputs and outputs; None of another form."""
+    parts = [[name.strip() for name in part.split(",")] for part in text.split(":")]
+    if len(parts) != 2 or not all(name for part in parts for name in part):
+        return None
+    return parts[0], parts[1]

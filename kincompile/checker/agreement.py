@@ -176,6 +176,8 @@ def is_alike(one: Array, other: Array, sizes: Array | float = 0.0) -> Array:
 def is_close(one: Array, other: Array, lost: Array | float = 0.0) -> bool:
     """Return whether the numbers of an entry, (N,), are those of a fault."""
     size = np.maximum(np.max(np.abs(one)), np.max(np.abs(other)))
+    if not np.isfinite(size):
+        return False
     return bool(np.all(np.abs(one - other) <= CLOSE * size + ABSOLUTE + lost))
 
 

@@ -25,16 +25,25 @@ from kincompile.checker.conventions import stated_conventions
 from kincompile.checker.given_forms import Forms
 from kincompile.checker.hand_file import read_hand_file
 from kincompile.checker.load_comparer import LoadComparer
-from kincompile.checker.reference import COMPARED, OF_LOADS, QUANTITIES, Reference, Subject
+from kincompile.checker.reference import (
+    COMPARED,
+    OF_LOADS,
+    OF_TRANSMISSIONS,
+    QUANTITIES,
+    Reference,
+    Subject,
+)
 from kincompile.checker.report import Report
 from kincompile.checker.states import given_states
+from kincompile.checker.transmission_compare import compare_maps, read_maps
+from kincompile.checker.transmission_reference import Transmission, TransmissionReference
 from kincompile.checker.written import REPORTED, read_written, vocabulary
 from kincompile.errors import InputError
 from kincompile.names import listed
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from numpy.typing import ArrayLike
 
@@ -45,7 +54,7 @@ if TYPE_CHECKING:
 
 
 def compare(
-    model: Mechanism | ConstraintSystem | Reference,
+    model: Mechanism | ConstraintSystem | Reference | Transmission,
     Phi: object = None,
     Phi_q: object = None,
     nu: object = None,
@@ -53,13 +62,17 @@ def compare(
     M: object = None,
     Q: object = None,
     *,
+    J: object = None,  # noqa: N803 - its name in the field
+    J_dot: object = None,  # noqa: N803
+    effort: object = None,
+    x: object = None,
     constraint: str | None = None,
     aliases: Mapping[str, object] | None = None,
     conventions: Mapping[str, str] | None = None,
     states: Mapping[str, ArrayLike] | None = None,
     strict: bool = False,
 ) -> Report:
-    r"""Compare hand-derived Phi, Phi_q, nu, gamma, M and Q with the generated ones.
+    r"""Compare Phi, Phi_q, nu, gamma, M and Q, or J and efforts, by hand with those derived.
 
     :math:`\Phi_q \dot q = \nu = -\Phi_t` and :math:`\Phi_q \ddot q = \gamma = -(\Phi_q \dot q)_q
     \dot q - 2 \Phi_{qt} \dot q - \Phi_{tt}` (Haug, section 3.1); :math:`M \ddot q + \Phi_q^T
@@ -104,14 +117,41 @@ def compare(
     InputError
         If a formula cannot be read, holds an unknown name, or has the wrong shape.
     """
-    given = {"Phi": Phi, "Phi_q": Phi_q, "nu": nu, "gamma": gamma, "M": M, "Q": Q}
-    forms = Forms(_reference(model), stated_conventions(conventions or {}), constraint)
+    values = (Phi, Phi_q, nu, gamma, M, Q, J, J_dot, effort, x)
+    pairs = zip((*COMPARED, *OF_TRANSMISSIONS), values, strict=True)
+    given = {name: value for name, value in pairs if value is not None}
+    reference, stated = _reference(model), stated_conventions(conventions or {})
+    _require_own(reference, given, constraint)
+    if isinstance(reference, TransmissionReference):
+        readings = read_maps(reference, given, aliases or {}, at_states=states is not None)
+        return compare_maps(reference, readings, states, stated, strict=strict)
+    forms = Forms(reference, stated, constraint)
     written = _read(forms, given, aliases or {}, at_states=states is not None)
     return _compared(forms, written, states, strict)
 
 
-def _reference(model: Mechanism | ConstraintSystem | Reference) -> Reference:
-    return model if isinstance(model, Reference) else Reference(model)
+def _reference(model: Mechanism | ConstraintSystem | Reference | Transmission) -> Reference:
+    if isinstance(model, Reference):
+        return model
+    return TransmissionReference(model) if isinstance(model, Transmission) else Reference(model)
+
+
+def _require_own(reference: Reference, given: Collection[str], constraint: str | None) -> None:
+    """Refuse what a transmission does not have, or a mechanism."""
+    is_function = isinstance(reference, TransmissionReference)
+    expected = OF_TRANSMISSIONS if is_function else COMPARED
+    if not given:
+        raise InputError(f"there is nothing to compare: give at least one of {listed(expected)}.")
+    if is_function and constraint is not None:
+        raise InputError("a transmission is compared as a whole: leave constraint out.")
+    if wrong := [name for name in given if name not in expected]:
+        belongs = (
+            "those of a mechanism: compare them with the model itself"
+            if is_function
+            else "those of a transmission: compare them with kc.transmission(model, inputs, "
+            "outputs); on the command line, with --transmission INPUTS:OUTPUTS"
+        )
+        raise InputError(f"{listed(wrong)}: {belongs}.")
 
 
 def _states(
@@ -126,7 +166,7 @@ def _states(
 
 
 def compare_file(
-    model: Mechanism | ConstraintSystem | Reference,
+    model: Mechanism | ConstraintSystem | Reference | Transmission,
     path: str | os.PathLike[str],
     *,
     constraint: str | None = None,
@@ -158,10 +198,15 @@ def compare_file(
     file = read_hand_file(Path(path))
     reference = _reference(model)
     constraint = file.constraint if constraint is None else constraint
-    if constraint is not None:
-        reference.block(constraint)
     try:
-        forms = Forms(reference, stated_conventions(file.conventions), constraint)
+        stated = stated_conventions(file.conventions)
+        _require_own(reference, file.quantities, constraint)
+        if isinstance(reference, TransmissionReference):
+            readings = read_maps(reference, file.quantities, file.aliases)
+            return compare_maps(reference, readings, None, stated, strict=strict)
+        if constraint is not None:
+            reference.block(constraint)
+        forms = Forms(reference, stated, constraint)
         written = _read(forms, file.quantities, file.aliases)
     except InputError as error:
         raise InputError([f"{file.name}, {problem}" for problem in error.problems]) from error
@@ -248,9 +293,6 @@ def _read(
     at_states: bool = False,
 ) -> dict[str, Written]:
     """Read all quantities, or raise all problems at once."""
-    given = {name: value for name, value in given.items() if value is not None}
-    if not given:
-        raise InputError(f"there is nothing to compare: give at least one of {listed(COMPARED)}.")
     if any(name in OF_LOADS for name in given):
         _require_loads(forms)
     words = vocabulary(forms.reference, aliases)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.checker.comparison import Convention
+from kincompile.checker.transmission_maps import KINDS
 from kincompile.errors import InputError
 from kincompile.model.small_rotations import BY_OMEGA, BY_P
 from kincompile.names import listed
@@ -27,9 +28,14 @@ FORM = "form"
 """The convention that says by what Phi_q has derivatives, and gamma the second rates."""
 GLOBAL = f"global {BY_OMEGA}"
 
+LOAD = "load"
+"""The convention by which effort is what outputs are loaded with, of the opposite sign."""
+
 _CHOICES: Mapping[str, tuple[str, ...]] = {
     **{name: (OPPOSITE[name], USUAL[name]) for name in OPPOSITE},
     FORM: (BY_P, BY_OMEGA, GLOBAL),
+    "J": tuple(KINDS),
+    "effort": (LOAD, "delivered"),
 }
 
 
@@ -39,6 +45,8 @@ class Stated:
 
     signs: Mapping[str, float]  # -1 for nu or gamma with the opposite sign
     form: str = ""  # the form of a mechanism in space, "" where it has to be found
+    kind: str = ""  # which matrix J of a transmission is, "" where it has to be found
+    is_load: bool = False  # whether effort is of what outputs are loaded with
 
 
 def stated_conventions(stated: Mapping[str, str]) -> Stated:
@@ -57,7 +65,7 @@ def stated_conventions(stated: Mapping[str, str]) -> Stated:
     if problems:
         raise InputError(problems)
     signs = {name: -1.0 for name, value in stated.items() if value == OPPOSITE.get(name)}
-    return Stated(signs, stated.get(FORM, ""))
+    return Stated(signs, stated.get(FORM, ""), stated.get("J", ""), stated.get("effort") == LOAD)
 
 
 def _choices() -> str:

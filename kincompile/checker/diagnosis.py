@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from kincompile.derive.equations import derive_equation
 from kincompile.model.resolve import FreeEquation, Joint
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from kincompile.checker.forms import Form
     from kincompile.checker.reference import ConstraintBlock, Reference
@@ -47,6 +47,28 @@ _NOT_DEFINED = Diagnosis(
     "it has no finite value at some states where the right one has: it divides by zero, or "
     "takes a root or logarithm of a negative number",
 )
+
+
+class OneEntry(Protocol):
+    """What may be wrong in one entry, from its numbers."""
+
+    def one(self, given: Shown) -> Iterable[Fault[Array]]:
+        """Return the slips that give an author's numbers."""
+
+    def two(self, given: Shown) -> Iterable[Fault[Array]]:
+        """Return two slips that together give an author's numbers."""
+
+
+class Entry(Protocol):
+    """One entry as it is typed."""
+
+    @property
+    def faults(self) -> Sequence[Fault[Array]]:
+        """The usual faults, with the entry's values."""
+
+    @property
+    def slips(self) -> OneEntry:
+        """All other slips."""
 
 
 def undecided_diagnosis(given: Given) -> Diagnosis:
@@ -91,40 +113,21 @@ class Diagnostician:
         form
             The form in which its author has it, None where it is written as generated.
         """
-        left = {place: item for place, item in written.items() if np.isfinite(item[0]).all()}
-        found: dict[Index, tuple[Diagnosis, ...]] = {}
-        found |= dict.fromkeys(written.keys() - left.keys(), (_NOT_DEFINED,))
-        catalogue = self._catalogue(block, quantity, form)
-        several = [*self._of_several(block, quantity, form, left)]
-        for faults in (catalogue, several):
-            found |= _explained(left, [fault for fault in faults if len(fault.result) > 1])
-        # One entry alone is looked at as it is typed first, in sines and cosines.
-        typed: list[NumericFault] = [
-            Fault(fault.kind, fault.text, {place: fault.result}, fault.detail)
-            for place in left
-            for fault in self._typed(quantity, place, form).faults
-        ]
-        catalogue = [*typed, *catalogue]
-        found |= _explained(left, catalogue)
-        for place, given in left.items():
-            right = self._right(quantity, form)[:, place[0], place[1]]
-            found[place] = (
-                _one_entry(place, given, right, catalogue)
-                or _named(self._typed(quantity, place, form).slips.one(given))
-                or _named(_at(place, given, several))
-            )
-        # What is left is no slip of one entry: another vector, or two slips at once.
+        left, found = defined(written)
         joint = block.constraint if form is None else form.joint
-        if isinstance(joint, Joint) and not all(found.values()):
-            vectors = [*self._faults_of(joint, block, quantity, left)]
-            found |= {
-                place: found[place] or _named(fault for fault in vectors if place in fault.result)
-                for place in left
-            }
-        for place, given in left.items():
-            slips = self._typed(quantity, place, form).slips
-            found[place] = found[place] or _named(slips.two(given))
-        return found
+
+        def vectors() -> Iterable[NumericFault]:
+            if isinstance(joint, Joint):
+                yield from self._faults_of(joint, block, quantity, left)
+
+        return found | looked_up(
+            left,
+            self._right(quantity, form),
+            self._catalogue(block, quantity, form),
+            [*self._of_several(block, quantity, form, left)],
+            lambda place: self._typed(quantity, place, form),
+            vectors,
+        )
 
     def is_one_fault(
         self, block: ConstraintBlock, written: Mapping[Index, Shown], form: Form | None
@@ -235,7 +238,8 @@ class Diagnostician:
             reference, row = self._reference, place[0]
             if form is not None and form.formulas is not None:
                 reference, row = form.formulas, form.rows.index(place[0])
-            self._entries[key] = TypedEntry(reference, quantity, row, place[1], self._states)
+            derived = reference.expression(quantity, row, place[1])
+            self._entries[key] = TypedEntry(reference, quantity, derived, self._states)
         return self._entries[key]
 
     def _of_several(
@@ -257,6 +261,66 @@ class Diagnostician:
         columns = {column for _, column in left} if quantity == "Phi_q" else ()
         yield from own.exchanged_columns(columns)
         yield from faults
+
+
+def defined(
+    written: Mapping[Index, Shown],
+) -> tuple[dict[Index, Shown], dict[Index, tuple[Diagnosis, ...]]]:
+    """Return the entries that have finite values, and what is said of the others."""
+    left = {place: item for place, item in written.items() if np.isfinite(item[0]).all()}
+    return left, dict.fromkeys(written.keys() - left.keys(), (_NOT_DEFINED,))
+
+
+def looked_up(
+    left: dict[Index, Shown],
+    right: Array,
+    catalogue: Sequence[NumericFault],
+    several: Sequence[NumericFault],
+    entry_of: Callable[[Index], Entry],
+    vectors: Callable[[], Iterable[NumericFault]],
+) -> dict[Index, tuple[Diagnosis, ...]]:
+    """Return the explanations of entries that differ, none where the catalogue has none.
+
+    Parameters
+    ----------
+    left
+        The author's values of these entries.
+    right
+        The right values of all, (N, rows, columns).
+    catalogue, several
+        Faults of a whole formula, and those that show in several entries.
+    entry_of
+        Gives an entry as it is typed.
+    vectors
+        Gives the vectors that fit entries which nothing else explains.
+    """
+    found: dict[Index, tuple[Diagnosis, ...]] = {}
+    for faults in (catalogue, several):
+        found |= _explained(left, [fault for fault in faults if len(fault.result) > 1])
+    # One entry alone is looked at as it is typed first, in sines and cosines.
+    typed: list[NumericFault] = [
+        Fault(fault.kind, fault.text, {place: fault.result}, fault.detail)
+        for place in left
+        for fault in entry_of(place).faults
+    ]
+    catalogue = [*typed, *catalogue]
+    found |= _explained(left, catalogue)
+    for place, given in left.items():
+        found[place] = (
+            _one_entry(place, given, right[:, place[0], place[1]], catalogue)
+            or _named(entry_of(place).slips.one(given))
+            or _named(_at(place, given, several))
+        )
+    # What is left is no slip of one entry: another vector, or two slips at once.
+    if not all(found.values()):
+        others = [*vectors()]
+        found |= {
+            place: found[place] or _named(fault for fault in others if place in fault.result)
+            for place in left
+        }
+    for place, given in left.items():
+        found[place] = found[place] or _named(entry_of(place).slips.two(given))
+    return found
 
 
 def _at(place: Index, given: Shown, catalogue: Iterable[NumericFault]) -> Iterator[Fault[Array]]:

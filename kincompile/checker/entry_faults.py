@@ -34,17 +34,29 @@ MOST_EXPANDED = 1000
 class TypedEntry:
     """One entry with its faults, which show there and nowhere else.
 
+    Parameters
+    ----------
+    derived
+        The right entry; the author's where `is_by_hand`, whose faults give what is right.
+
     Attributes
     ----------
     entry
-        The right formula as it is typed, a sum of products where that is not too long.
+        That formula as it is typed, a sum of products where that is not too long.
     """
 
     def __init__(
-        self, reference: Reference, quantity: str, row: int, column: int, states: States
+        self,
+        reference: Reference,
+        quantity: str,
+        derived: sympy.Expr,
+        states: States,
+        *,
+        is_by_hand: bool = False,
     ) -> None:
         self._reference, self._quantity, self._states = reference, quantity, states
-        self._derived = self.entry = reference.expression(quantity, row, column)
+        self._derived = self.entry = derived
+        self._is_by_hand = is_by_hand
         if _count(self._derived) <= MOST_EXPANDED:
             self.entry = _multiplied_out(self._derived)
 
@@ -53,7 +65,9 @@ class TypedEntry:
         """What may stand in the place of its products, besides the usual faults."""
         is_short = len(sympy.Add.make_args(self.entry)) <= MOST_TERMS
         forms = dict.fromkeys((self._derived, self.entry) if is_short else (self._derived,))
-        return Slips(self._reference, list(forms), self._quantity, self._states)
+        return Slips(
+            self._reference, list(forms), self._quantity, self._states, is_by_hand=self._is_by_hand
+        )
 
     @property
     def faults(self) -> list[Fault[Array]]:
@@ -70,21 +84,24 @@ class TypedEntry:
         """The usual faults, the part in whose place each result stands, and the entry's values."""
         reference, entry = self._reference, self.entry
         printed = reference.printed(entry)
-        angles = [
-            sympy.Symbol(name)
-            for name, is_angle in zip(reference.coordinates, reference.angular, strict=True)
-            if is_angle
-        ]
-        faults = [*whole_faults(self._quantity, "the entry", lambda x: x * entry, printed)]
+        angles = [sympy.Symbol(name) for name in reference.angles]
+        faults: list[Fault[sympy.Expr]] = []
+        if not self._is_by_hand:  # else its multiples are slips
+            faults += whole_faults(self._quantity, "the entry", lambda x: x * entry, printed)
         text = "sine and cosine are swapped throughout"
         faults.append(Fault(Kind.SINE_COSINE, text, _sine_cosine(entry), printed))
         terms = sympy.Add.make_args(entry)
         parts = [entry, *terms] if len(terms) <= MOST_TERMS else [entry]
         replaced = [0] * len(faults)  # number of the part in whose place the result stands
         for k, term in enumerate(parts[1:], 1):
-            found = list(_faults_of_term(term, angles))
-            faults += found
-            replaced += [k] * len(found)
+            # One angle for another may divide by zero.
+            named = [
+                item
+                for item in _faults_of_term(term, angles, self._is_by_hand)
+                if not item.result.has(sympy.zoo, sympy.nan)
+            ]
+            faults += named
+            replaced += [k] * len(named)
         # Sums are taken of numbers: SymPy would sort the terms of each.
         evaluated = reference.evaluate([*parts, *(fault.result for fault in faults)], self._states)
         values, sizes = (item[..., None] for item in evaluated)
@@ -121,24 +138,30 @@ def _count(expression: Any) -> int:
 
 
 def _faults_of_term(
-    term: sympy.Expr, angles: Sequence[sympy.Symbol]
+    term: sympy.Expr, angles: Sequence[sympy.Symbol], is_by_hand: bool
 ) -> Iterator[Fault[sympy.Expr]]:
     """Yield the faults of a term; the result stands in its place."""
     full = str(term)
-    yield from term_faults(A_TERM, lambda factor: factor * term, full)
+    if not is_by_hand:
+        yield from term_faults(A_TERM, lambda factor: factor * term, full)
     functions = sorted(term.atoms(sympy.sin, sympy.cos), key=str)
     yield Fault(Kind.SINE_COSINE, "sine and cosine are swapped in a term", _sine_cosine(term), full)
     for function in functions if len(functions) > 1 else ():
         text = f"sine and cosine of {function.args[0]} are swapped in a term"
         swapped = term.xreplace({function: _sine_cosine(function)})
         yield Fault(Kind.SINE_COSINE, text, swapped, full)
+        if function.func == sympy.cos and function.args[0].is_Add:
+            # cos(a - b) is also cos(b - a), whose sine is the other one.
+            yield Fault(Kind.SINE_COSINE, text, -swapped, full)
     for angle in angles:
         for other in angles if term.has(angle) else ():
             if other != angle:
-                text = f"{other} stands where {angle} belongs, in a term"
+                one, belonging = (angle, other) if is_by_hand else (other, angle)
+                text = f"{one} stands where {belonging} belongs, in a term"
                 mixed = {item: item.xreplace({angle: other}) for item in functions}
                 yield Fault(Kind.MIXED_ANGLES, text, term.xreplace(mixed), full)
-    yield from _missing_factors(term, full)
+    if not is_by_hand:
+        yield from _missing_factors(term, full)
 
 
 def _sine_cosine(expression: sympy.Expr) -> sympy.Expr:

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 from kincompile.checker.conventions import GLOBAL
 from kincompile.checker.layouts import expected_widths, usual_layout
-from kincompile.checker.reference import OF_LOADS, Reference, Subject
+from kincompile.checker.reference import MATRICES, OF_LOADS, Reference, Subject
 from kincompile.checker.turned import TurnedReference
-from kincompile.checker.written import MATRICES
 from kincompile.errors import InputError
 from kincompile.model.small_rotations import BY_OMEGA, BY_P, is_norm
 from kincompile.names import listed

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING
 
 from kincompile.checker.matrix_text import Cell, Rows, split_matrix
 from kincompile.checker.notation import plain
-from kincompile.checker.reference import COMPARED
+from kincompile.checker.reference import COMPARED, OF_TRANSMISSIONS
 from kincompile.errors import InputError, ModelError
 from kincompile.files.content import decoded, file_content
 from kincompile.files.data_text import MAX_PROBLEMS, read_json, read_toml
 from kincompile.files.formula_text import ExpressionError
 from kincompile.files.text_places import TextPlace, TextPlaces
-from kincompile.names import escaped, listed, shown, suggestion
+from kincompile.names import escaped, listed, shown, suggestion, transmission_ends
 
 if TYPE_CHECKING:
     import os
@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 1_000_000
 """Largest hand file; Phi_q of 300 coordinates has a third of this."""
+ALL = (*COMPARED, *OF_TRANSMISSIONS)
+ENDS = ("inputs", "outputs")
+Ends = tuple[list[str], list[str]]
 _STATEMENT = re.compile(r"[ \t]*([A-Za-z_]\w*)[ \t]*=[ \t]*")
 _SECTION = re.compile(r"[ \t]*\[[ \t]*([A-Za-z_]\w*)[ \t]*\][ \t;]*(?=\n|$)")
 _QUOTES = ('"""', "'''", '"', "'")
@@ -44,10 +47,11 @@ class HandFile:
     """The content of a hand file, still as text."""
 
     name: str
-    quantities: Mapping[str, Rows]  # rows of elements by quantity: Phi, Phi_q, nu, gamma, M, Q
+    quantities: Mapping[str, Rows]  # rows of elements by quantity
     aliases: Mapping[str, Cell]  # the author's own names, each with its expression
     constraint: str | None
-    conventions: Mapping[str, str]  # the author's conventions for nu and gamma
+    conventions: Mapping[str, str]  # the author's conventions
+    transmission: Ends | None = None  # inputs and outputs, where it is of a transmission
 
 
 class _Draft:
@@ -60,6 +64,8 @@ class _Draft:
         self._problems: list[str] = []
         self.constraint: str | None = None
         self.conventions: dict[str, str] = {}
+        self.transmission: Ends | None = None
+        self._ends: dict[str, list[str]] = {}
 
     def problem(self, place: TextPlace, text: str) -> None:
         """Add a problem; very many end the reading."""
@@ -82,9 +88,28 @@ class _Draft:
             self.problem(place, f"{shown(name)} is given twice; keep one of them")
         self._aliases[name] = Cell(text, place)
 
+    def add_transmission(self, value: str, place: TextPlace) -> None:
+        """Add the names of inputs and outputs."""
+        self.transmission = transmission_ends(value)
+        if self.transmission is None:
+            self.problem(
+                place,
+                f"transmission = {shown(value)} is not of the form INPUTS:OUTPUTS; write names "
+                "with commas, as left,right:pitch,roll",
+            )
+
+    def add_end(self, name: str, names: list[str], place: TextPlace) -> None:
+        """Add the names of inputs, or those of outputs."""
+        if name not in ENDS or not all(names):
+            self.problem(place, f"transmission has {shown(name)}: it has names of {listed(ENDS)}")
+            return
+        self._ends[name] = names
+        if len(self._ends) == len(ENDS):
+            self.transmission = self._ends["inputs"], self._ends["outputs"]
+
     def unknown(self, name: str, place: TextPlace) -> None:
         """Add the problem of a key that means nothing."""
-        keys = (*COMPARED, "constraint", "aliases", "conventions")
+        keys = (*ALL, "constraint", "transmission", "aliases", "conventions")
         hint = suggestion(name, keys)
         self.problem(place, f"there is no quantity {shown(name)}{hint}; expected: {listed(keys)}")
 
@@ -93,13 +118,14 @@ class _Draft:
         if not self._problems and not self._quantities:
             self.problem(
                 TextPlace(),
-                f"the file compares nothing; give at least one of: {listed(COMPARED)}",
+                f"the file compares nothing; give at least one of: {listed(ALL)}",
             )
         if self._problems:
             raise InputError(self._problems)
         return HandFile(
-            self._name, self._quantities, self._aliases, self.constraint, self.conventions
-        )
+            self._name, self._quantities, self._aliases, self.constraint, self.conventions,
+            self.transmission,
+        )  # fmt: skip
 
 
 def read_hand_file(path: str | os.PathLike[str]) -> HandFile:
@@ -108,10 +134,12 @@ def read_hand_file(path: str | os.PathLike[str]) -> HandFile:
     Parameters
     ----------
     path
-        A ``.json`` or ``.toml`` file with the keys Phi, Phi_q, nu, gamma, M, Q (each a text as one
-        writes it, or lists of numbers and texts), constraint (a name), aliases (a table of names
-        and expressions) and conventions (``nu = "Phi_t"``, ``gamma = "left side"``); or any other
-        text file with lines ``Name = [[...], ...]``, where further names are aliases.
+        A ``.json`` or ``.toml`` file with the keys Phi, Phi_q, nu, gamma, M, Q, or J, J_dot,
+        effort, x (each a text as one writes it, or lists of numbers and texts), constraint (a
+        name), transmission (``"left,right:pitch,roll"``, or a table of inputs and outputs), aliases
+        (a table of names and expressions) and conventions (``nu = "Phi_t"``, ``gamma = "left
+        side"``); or any other text file with lines ``Name = [[...], ...]``, where further names are
+        aliases. In lines, J and x without brackets are names of the author's own.
 
     Raises
     ------
@@ -176,7 +204,7 @@ def _from_lines(file: Path, content: bytes) -> HandFile:
                 draft.problem(
                     places[offset],
                     f"expected 'name = value', found {line.strip()[:40]!r}; names are "
-                    f"{listed(COMPARED)}, and your own for aliases",
+                    f"{listed(ALL)}, and your own for aliases",
                 )
             offset += len(line) + 1
     return draft.finished()
@@ -185,13 +213,19 @@ def _from_lines(file: Path, content: bytes) -> HandFile:
 def _add_statement(
     draft: _Draft, section: str | None, name: str, value: str, place: TextPlace
 ) -> None:
+    is_list = value.lstrip().startswith("[")
     if section == "conventions":
         draft.conventions[name] = value.strip()
-    elif name in COMPARED:
+    elif section == "transmission":
+        names = [item.strip() for item in value.strip(" \t\n[]").split(",")]
+        draft.add_end(name, names, place)
+    elif name in COMPARED or (section is None and name in OF_TRANSMISSIONS and is_list):
         draft.add_matrix(name, value, place)
+    elif section is None and name == "transmission":
+        draft.add_transmission(value, place)
     elif section is None and name == "constraint":
         draft.constraint = value.strip()
-    elif section != "aliases" and value.lstrip().startswith("["):
+    elif section != "aliases" and is_list:
         draft.unknown(name, place)
     else:
         draft.add_alias(name, value.strip(), place)
@@ -224,8 +258,14 @@ def _from_data(name: str, document: Document) -> HandFile:
     places = TextPlaces(document.text)
     for key, value in document.data.items():
         locate = _Locator(document, places, (key,))
-        if key in COMPARED:
+        if key in ALL:
             _add_data(draft, key, value, locate)
+        elif key == "transmission" and isinstance(value, str):
+            draft.add_transmission(value, locate.place(value))
+        elif key == "transmission" and isinstance(value, dict):
+            for end, names in value.items():
+                own = names if isinstance(names, list) else [names]
+                draft.add_end(end, [str(item).strip() for item in own], locate.place(""))
         elif key == "constraint" and isinstance(value, str):
             draft.constraint = value
         elif key == "conventions" and isinstance(value, dict):

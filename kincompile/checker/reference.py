@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -14,6 +15,7 @@ import sympy
 from kincompile import quantities
 from kincompile.checker.agreement import OF_ROW, ROUNDING, Right, finite
 from kincompile.checker.comparison import Difference
+from kincompile.checker.naming import mechanism_help, mechanism_names
 from kincompile.checker.rounding import cancelled
 from kincompile.checker.states import (
     SEED,
@@ -51,7 +53,13 @@ OF_LOADS = ("M", "Q")
 """What is compared of a mechanism with masses and loads, besides."""
 
 COMPARED = (*QUANTITIES, *OF_LOADS)
-"""All that is compared."""
+"""All that is compared of a mechanism."""
+
+OF_TRANSMISSIONS = ("J", "J_dot", "effort", "x")
+"""What is compared of a transmission."""
+
+MATRICES, MOVING = ("Phi_q", "M", "J", "J_dot"), ("gamma", "Q")
+"""Quantities with several columns, and those of a mechanism that depend on rates."""
 
 FAR = 100
 """In sizes: from a mechanism that stands farther away than this, states lie about its guess."""
@@ -116,6 +124,8 @@ class Reference:
     convention: Convention | None = None
     """The form that it is, where that is not the system's own."""
     is_global: bool = False
+    forces: Mapping[str, str] = MappingProxyType({})
+    """Names of efforts that formulas may use, with what they are: of a mechanism none."""
 
     def __init__(self, model: Mechanism | ConstraintSystem) -> None:
         self.system = system_of(model)
@@ -152,6 +162,50 @@ class Reference:
     def another(self, model: Mechanism | ConstraintSystem) -> Reference:
         """Return the formulas of another system of these coordinates, in this form."""
         return Reference(model)
+
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Names of values, one of which may be written for another: coordinates, parameters."""
+        return (*self.base.coordinates, *(item.name for item in self.system.parameters))
+
+    @property
+    def angles(self) -> tuple[str, ...]:
+        """Names of angles, one of which may be written for another."""
+        pairs = zip(self.coordinates, self.angular, strict=True)
+        return tuple(name for name, is_angle in pairs if is_angle)
+
+    def names(self) -> tuple[tuple[str, str], ...]:
+        """Return names that formulas use, each with the symbol that it is and that has a rate."""
+        return mechanism_names(self.system, self.coordinates)
+
+    def names_help(self) -> str:
+        """Return in words which names formulas may use."""
+        return mechanism_help(self.system, self.coordinates, self.spins)
+
+    def arguments(self, quantity: str, given: Sequence[str] | None) -> list[tuple[str, ...]]:
+        """Return what a function of a quantity is called with: a choice of names of values.
+
+        Parameters
+        ----------
+        given
+            The names of its arguments, None where they are not known.
+
+        Raises
+        ------
+        InputError
+            If there are too few.
+        """
+        names = ("q", "q_dot", "t") if quantity in MOVING else ("q", "t")
+        if given is not None and len(given) < len(names):
+            raise InputError(
+                f"{quantity}: the function takes {len(given)} arguments; expected {names}."
+            )
+        return [(*names, "p") if given is None or len(given) > len(names) else names]
+
+    def argument(self, name: str, states: States) -> Array:
+        """Return values that a function is called with, the states first."""
+        found: Array = getattr(states, name)
+        return found
 
     @cached_property
     def blocks(self) -> tuple[ConstraintBlock, ...]:

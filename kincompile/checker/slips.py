@@ -4,12 +4,15 @@ An entry is a sum of products, in brackets too, and linear in each of them. So t
 says what stands in the place of a product, if all the rest is right. That is looked up: a constant
 multiple; another variable, or function of one, in a factor; a factor too much, missing, or of
 another power. Two slips at once are two such differences whose sum is the author's.
+
+A sum under a root or a fraction bar is such an entry of its own. Where the right formula is not
+known, as of a transmission, the author's is taken apart, and the right number says what belongs.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -18,7 +21,7 @@ import numpy as np
 import sympy
 
 from kincompile.checker.agreement import ABSOLUTE, CLOSE
-from kincompile.checker.fault import A_TERM, Fault, Kind, multiple_fault
+from kincompile.checker.fault import A_TERM, NEAR, Fault, Kind, multiple_fault
 from kincompile.names import rate
 
 if TYPE_CHECKING:
@@ -65,13 +68,21 @@ class Slips:
     ----------
     forms
         The entry as it is derived, and multiplied out where that is short.
+    is_by_hand
+        Whether the forms are the author's, and what is given is right.
     """
 
     def __init__(
-        self, reference: Reference, forms: Sequence[sympy.Expr], quantity: str, states: States
+        self,
+        reference: Reference,
+        forms: Sequence[sympy.Expr],
+        quantity: str,
+        states: States,
+        *,
+        is_by_hand: bool = False,
     ) -> None:
         self._reference, self._states, self._forms = reference, states, forms
-        self._has_rates = quantity == "gamma"
+        self._quantity, self._is_by_hand = quantity, is_by_hand
 
     def one(self, given: Shown) -> Iterator[Fault[Array]]:
         """Yield the slips that give an author's numbers, the simplest that there are."""
@@ -84,6 +95,36 @@ class Slips:
                     yield Fault(*item.named(k), given[0])
             if found:
                 return
+        yield from self._inside(given, off)
+
+    def _inside(self, given: Shown, off: Array) -> Iterator[Fault[Array]]:
+        """Yield the slips in a sum that has a power: under a fraction bar or a root."""
+        for product in self._products:
+            for factor in product.factors:
+                base, exponent = factor.as_base_exp()
+                if not base.is_Add or not exponent.is_number or exponent == 1:
+                    continue
+                if base not in self._sums:
+                    forms = list(dict.fromkeys((base, sympy.expand(base))))
+                    self._sums[base] = Slips(
+                        self._reference, forms, self._quantity, self._states,
+                        is_by_hand=self._is_by_hand,
+                    )  # fmt: skip
+                (value,) = self._values([base]).T
+                with np.errstate(all="ignore"):
+                    ratio = 1 + off / product.value
+                    needed = value * ratio ** float(1 / exponent)
+                    lost = given[1] * np.abs(value / (product.value * float(exponent)))
+                if np.isfinite(needed).all() and np.isfinite(lost).all():
+                    yield from (
+                        replace(item, result=given[0])
+                        for item in self._sums[base].one((needed, lost))
+                    )
+
+    @cached_property
+    def _sums(self) -> dict[sympy.Expr, Slips]:
+        """The sums that were looked into."""
+        return {}
 
     def two(self, given: Shown) -> Iterator[Fault[Array]]:
         """Yield two slips in different products that together give an author's numbers, if any."""
@@ -130,14 +171,17 @@ class Slips:
         for factor, own_terms in groups:
             value = self._values(own_terms).sum(axis=1)
             products.append(_Product(f"all terms with {factor}", (factor,), value))
+        varying = [term for term in terms if not term.is_number]
+        if 1 < len(varying) < len(terms):
+            value = self._values(varying).sum(axis=1)
+            products.append(_Product("the sum of all terms but the constant", (), value))
         return products
 
     @cached_property
     def _words(self) -> tuple[list[sympy.Expr], Array]:
         """What may stand where another factor belongs, with its values: (N, count)."""
         reference, found = self._reference, dict[sympy.Expr, None]()
-        names = [*reference.base.coordinates, *(item.name for item in reference.system.parameters)]
-        symbols = [sympy.Symbol(name) for name in names]
+        symbols = [sympy.Symbol(name) for name in reference.symbols]
         bases = [
             factor.as_base_exp()[0] for product in self._products for factor in product.factors
         ]
@@ -150,7 +194,7 @@ class Slips:
                 others = (function.xreplace({own: other}) for other in symbols)
                 for other in others:
                     found |= dict.fromkeys((other, _partner(other)))
-        if self._has_rates:
+        if self._quantity in ("gamma", "J_dot"):
             found |= dict.fromkeys(sympy.Symbol(rate(item)) for item in reference.base.coordinates)
         words = [item for item in found if not item.is_number][:MOST_WORDS]
         return words, self._values(words)
@@ -160,12 +204,20 @@ class Slips:
         if square:
             factor = 1 + off @ product.value / square
             changes = (factor - 1) * product.value[:, None]
-            yield _Changes(changes, lambda _: multiple_fault(product.name, factor))
+            yield _Changes(changes, lambda _: self._multiple_fault(product.name, factor))
 
     def _fixed_multiples(self, product: _Product) -> _Changes:
         factors = np.array([float(item) for item in MULTIPLES])
         changes = product.value[:, None] * (factors - 1)
-        return _Changes(changes, lambda k: multiple_fault(product.name, factors[k]))
+        return _Changes(changes, lambda k: self._multiple_fault(product.name, factors[k]))
+
+    def _multiple_fault(self, name: str, factor: float) -> tuple[str, str]:
+        """Return kind and text of a product that has to be a multiple of what it is."""
+        if not self._is_by_hand:
+            return multiple_fault(name, factor)
+        if abs(factor) <= NEAR:
+            return Kind.EXTRA_TERM, f"{name} is too much"
+        return multiple_fault(name, 1 / factor)
 
     def _other_words(self, product: _Product, off: Array) -> Iterator[_Changes]:
         """Yield the slips with another variable in a factor, or in one of a power's factors."""
@@ -182,7 +234,8 @@ class Slips:
                     changes = product.value[:, None] * (ratio - 1)
 
                 def named(k: int, base: sympy.Expr = base) -> tuple[str, str]:
-                    text = f"{words[k]} stands where {base} belongs, in {product.name}"
+                    one, other = (base, words[k]) if self._is_by_hand else (words[k], base)
+                    text = f"{one} stands where {other} belongs, in {product.name}"
                     return Kind.OTHER_VARIABLE, text
 
                 yield _Changes(changes, named)
@@ -196,7 +249,7 @@ class Slips:
                 changes = product.value[:, None] * (values ** float(power) - 1)
 
             def named(k: int, power: sympy.Expr = power) -> tuple[str, str]:
-                return _of_power(words[k], power, product)
+                return _of_power(words[k], power, product, self._is_by_hand)
 
             yield _Changes(changes, named)
 
@@ -240,14 +293,21 @@ def _terms(
 
 def _partner(function: sympy.Expr) -> sympy.Expr:
     """Return the cosine for a sine, and the sine for a cosine."""
-    other: sympy.Expr = (sympy.cos if function.func == sympy.sin else sympy.sin)(*function.args)
+    # SymPy may have taken a sign out of it.
+    pairs = {sympy.sin: sympy.cos, sympy.cos: sympy.sin}
+    own = function.atoms(sympy.sin, sympy.cos)
+    other: sympy.Expr = function.xreplace({item: pairs[item.func](*item.args) for item in own})
     return other
 
 
-def _of_power(word: sympy.Expr, power: sympy.Expr, product: _Product) -> tuple[str, str]:
+def _of_power(
+    word: sympy.Expr, power: sympy.Expr, product: _Product, is_by_hand: bool
+) -> tuple[str, str]:
     """Return kind and text of a product times a power of a word."""
     exponents = dict(factor.as_base_exp() for factor in product.factors)
     own = exponents.get(word, sympy.S.Zero)
+    if is_by_hand:  # the product is the author's: what it is too little in, the right one has
+        own, power = own + power, -power
     if abs(own + power) < abs(own):
         is_rate = isinstance(word, sympy.Symbol) and word.name.endswith(rate(""))
         kind = Kind.MISSING_RATE if is_rate else Kind.MISSING_FACTOR

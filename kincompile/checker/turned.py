@@ -100,7 +100,7 @@ class TurnedReference(Reference):
         for body in self.system.bodies:
             names = turned_columns(body)[3:]
             own = tuple(entries.get(name, sympy.S.Zero) for name in names)
-            entries |= dict(zip(names, _turned(body.symbols[3:], own), strict=True))
+            entries |= dict(zip(names, turned_vector(body.symbols[3:], own), strict=True))
         return replace(row, Phi_q=entries)
 
     def expression(self, quantity: str, row: int, column: int) -> sympy.Expr:
@@ -147,7 +147,7 @@ class TurnedReference(Reference):
         if not self.is_global or body.is_ground:
             return block
         p = tuple(self._p(body, states).T[..., None])
-        return np.stack(_turned(p, tuple(np.moveaxis(block, -1, 0))), axis=-1)
+        return np.stack(turned_vector(p, tuple(np.moveaxis(block, -1, 0))), axis=-1)
 
     def gradient(self, Phi_q: Callable[[States], Array]) -> Callable[[States], Array]:
         """Return by r and p what is given by r and small rotations, constant along p."""
@@ -182,7 +182,7 @@ class TurnedReference(Reference):
         return self.normalised(self.base.about_guess(like))
 
 
-def _turned(p: Components, vector: Components) -> Components:
+def turned_vector(p: Components, vector: Components) -> Components:
     """Return A v, which as a row is v^T A^T."""
     rotation = EulerRotation(VectorSymbol("p", 4))
     entries = rotation.entries((p,), lambda name, value: NotImplemented)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ from kincompile.checker import rounding
 from kincompile.checker.agreement import Given
 from kincompile.checker.matrix_text import Cell, split_matrix
 from kincompile.checker.notation import IMAGINARY, plain, real
+from kincompile.checker.reference import MATRICES
 from kincompile.errors import InputError
 from kincompile.files.data_text import MAX_PROBLEMS
 from kincompile.files.formula_text import ExpressionError
@@ -42,9 +43,6 @@ MAX_SIZE = 1_000_000
 
 REPORTED = ""
 """Placeholder for a quantity whose unknown names have all been reported already."""
-MATRICES, MOVING = ("Phi_q", "M"), ("gamma", "Q")
-"""Quantities with a column for each coordinate, and those that depend on rates."""
-
 _NO_ACCELERATIONS = "accelerations are the unknowns of Phi_q q_ddot = gamma; no formula holds them"
 
 
@@ -59,6 +57,8 @@ class Written:
     expressions: tuple[sympy.Expr, ...] | None = None
     # Its rounding, in words.
     rounding: str = "numbers are rounded; they count to half of their last digit"
+    # What a function is called with, by name.
+    arguments: tuple[str, ...] = ()
     # Whether it may be evaluated at other parameters than the default ones.
     takes_parameters: bool = True
     # Whether it may be evaluated at any states, not only those its author gave.
@@ -68,6 +68,11 @@ class Written:
     def shape(self) -> tuple[int, int]:
         """Number of rows and columns."""
         return len(self.texts), len(self.texts[0])
+
+    def uses(self, name: str) -> bool:
+        """Return whether formulas have a name in them; functions may have any."""
+        symbol = sympy.Symbol(name)
+        return self.expressions is None or any(item.has(symbol) for item in self.expressions)
 
     def formula(self, row: int, column: int) -> sympy.Expr | None:
         """Return an entry as an expression, None of functions and arrays."""
@@ -179,7 +184,7 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
         raise InputError(f"there are {len(aliases)} aliases; at most {MAX_ALIASES} are read")
     reference = reference.base
     names, refused = _names_of(reference)
-    words = Vocabulary(names, refused, _help(reference))
+    words = Vocabulary(names, refused, reference.names_help())
     problems = []
     for name, value in aliases.items():
         problem = _alias_problem(name, names)
@@ -200,11 +205,13 @@ def vocabulary(reference: Reference, aliases: Mapping[str, object]) -> Vocabular
 
 def _names_of(reference: Reference) -> tuple[dict[str, sympy.Expr], dict[str, str]]:
     """Return the names of a system with their meanings, and those of accelerations."""
-    symbols = [*reference.coordinates, *(item.name for item in reference.system.parameters)]
+    own = reference.names()
+    symbols = dict.fromkeys((*reference.symbols, *(name for _, name in own)))
     names: dict[str, sympy.Expr] = {name: sympy.Symbol(name) for name in symbols}
-    names |= {"t": t} | {rate(name): sympy.Symbol(rate(name)) for name in reference.coordinates}
+    names |= {"t": t} | {rate(name): sympy.Symbol(rate(name)) for _, name in own}
+    names |= {written: sympy.Symbol(name) for written, name in reference.forces.items()}
     refused = {}
-    for written, name in [*((name, name) for name in reference.coordinates), *_numbered(reference)]:
+    for written, name in own:
         names.setdefault(written, names[name])
         for end in ("_dot", "d"):
             names.setdefault(f"{written}{end}", names[rate(name)])
@@ -214,33 +221,6 @@ def _names_of(reference: Reference) -> tuple[dict[str, sympy.Expr], dict[str, st
         refused[rate(name)] = refused[f"{name}d"] = _NO_ACCELERATIONS
     names.setdefault("I", IMAGINARY)
     return names, refused
-
-
-def _numbered(reference: Reference) -> Iterator[tuple[str, str]]:
-    """Yield coordinates as courses number them: x1, y1, phi1, also x_1, of body 1; q1 of all."""
-    bodies = zip(reference.system.bodies, reference.body_columns, strict=True)
-    for number, (body, columns) in enumerate(bodies, 1):
-        for letter, column in zip(body.kind.letters, columns, strict=True):
-            for written in (f"{letter}{number}", f"{letter}_{number}"):
-                yield written, reference.coordinates[column]
-    for number, name in enumerate(reference.coordinates, 1):
-        yield f"q{number}", name
-        yield f"q_{number}", name
-
-
-def _help(reference: Reference) -> str:
-    system = reference.system
-    names = [*reference.coordinates, *(item.name for item in system.parameters), "t"]
-    text = f"the names are: {listed(names, 60)}, and rates such as {rate(names[0])}"
-    if reference.spins:
-        text += f", {listed(reference.spins, 6)}"
-    if system.bodies:
-        numbers = listed(f"{k} {body.name}" for k, body in enumerate(system.bodies, 1))
-        text += (
-            f"; bodies are numbered: {numbers}, so that x1 is {reference.coordinates[0]}; for a "
-            "name of your own write a line 'name = formula'"
-        )
-    return text
 
 
 def _alias_problem(name: str, names: Mapping[str, sympy.Expr]) -> str | None:
@@ -279,7 +259,8 @@ def read_written(
     if isinstance(given, np.ndarray) and given.dtype != object:
         return _from_array(quantity, given, at_states)
     if callable(given) and not isinstance(given, sympy.Basic):
-        return _from_function(quantity, given, reference)
+        names, *_ = reference.arguments(quantity, argument_names(given))
+        return from_function(quantity, given, reference, names)
     rows = _rows(quantity, given)
     _check_rectangular(quantity, rows)
     if quantity not in MATRICES and len(rows) == 1:
@@ -417,19 +398,26 @@ def _from_array(quantity: str, given: Array, at_states: bool) -> Written:
     return Written(texts, evaluate)
 
 
-def _from_function(quantity: str, function: Callable[..., object], reference: Reference) -> Written:
-    names = ("q", "q_dot", "t") if quantity in MOVING else ("q", "t")
-    count = _positional_count(function)
-    if count is not None and count < len(names):
-        raise InputError(f"{quantity}: the function takes {count} arguments; expected {names}.")
-    takes_parameters = count is None or count > len(names)
+def from_function(
+    quantity: str, function: Callable[..., object], reference: Reference, names: Sequence[str]
+) -> Written:
+    """Return a function that is called with values of these names, one state after the other."""
 
     def at(states: States, k: int) -> Array:
         """Return the values at one state, (rows, columns)."""
         # Copies: what a function does to its arguments must not change the states.
-        arguments = [np.copy(getattr(states, name)[k])[()] for name in names]
-        arguments += [states.p[k].copy()] if takes_parameters else []
-        value = np.asarray(function(*arguments), dtype=float)
+        arguments = [np.copy(reference.argument(name, states)[k])[()] for name in names]
+        try:
+            value = np.asarray(function(*arguments), dtype=float)
+        except Exception as error:
+            values = ", ".join(
+                f"{name} = {np.array2string(np.asarray(x), precision=6)}"
+                for name, x in zip(names, arguments, strict=True)
+            )
+            raise InputError(
+                f"{quantity}: the function raises {type(error).__name__}: {error}, at {values}. "
+                "Give one that returns an array of real numbers there."
+            ) from error
         return value if quantity in MATRICES else value.reshape(-1, 1)
 
     def evaluate(states: States) -> Given:
@@ -443,12 +431,13 @@ def _from_function(quantity: str, function: Callable[..., object], reference: Re
         _no_texts(shape),
         evaluate,
         rounding="its values agree to six digits, as differences and single precision do",
-        takes_parameters=takes_parameters,
+        arguments=tuple(names),
+        takes_parameters="p" in names,
     )
 
 
-def _positional_count(function: Callable[..., object]) -> int | None:
-    """Return how many arguments a function takes by position, None if that is not known."""
+def argument_names(function: Callable[..., object]) -> list[str] | None:
+    """Return the names of the arguments by position, None if they are not known."""
     try:
         found = list(inspect.signature(function).parameters.values())
     except (TypeError, ValueError):
@@ -457,4 +446,8 @@ def _positional_count(function: Callable[..., object]) -> int | None:
         return None
     by_position = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
     # A number as default is an option of the author's, a step for instance, and not p.
-    return sum(item.kind in by_position and not isinstance(item.default, Real) for item in found)
+    return [
+        item.name
+        for item in found
+        if item.kind in by_position and not isinstance(item.default, Real)
+    ]

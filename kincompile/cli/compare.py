@@ -4,20 +4,32 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import kincompile as kc
-from kincompile.cli.shared import DIFFERENT, output_option, print_data, read_model, require_output
+from kincompile.cli.shared import (
+    DIFFERENT,
+    output_option,
+    print_data,
+    read_model,
+    require_output,
+    transmission_option,
+)
 from kincompile.errors import InputError
+from kincompile.names import listed
 from kincompile.writing import write_atomically
+
+if TYPE_CHECKING:
+    from kincompile.cli.shared import Ends
 
 
 @click.command("compare")
 @click.argument("model")
 @click.argument("hand")
 @click.option("--constraint", metavar="NAME", help="Check this constraint alone.")
+@transmission_option("HAND has J and efforts of this function")
 @click.option("--reveal", is_flag=True, help="Show the right formulas.")
 @click.option("--strict", is_flag=True, help="Accept no convention: equal everywhere, or wrong.")
 @output_option("Write the report: .html, .json or .txt.", required=False)
@@ -28,6 +40,7 @@ def command(
     model: str,
     hand: str,
     constraint: str | None,
+    transmission: Ends | None,
     reveal: bool,
     strict: bool,
     output: str | None,
@@ -36,7 +49,9 @@ def command(
     """Compare the formulas in HAND with those derived from MODEL.
 
     HAND is a TOML or JSON file, or lines such as "Phi_q = [[1, 0, cos(phi)], ...]", with any of
-    Phi, Phi_q, nu, gamma, M and Q. Its formulas are parsed, never run. The exit code is 0 where all
+    Phi, Phi_q, nu, gamma, M and Q; or with J, J_dot, effort and x of a transmission, whose inputs
+    and outputs are those of the option, of HAND, or of the table [transmission] of MODEL. Its
+    formulas are parsed, never run. The exit code is 0 where all
     entries are accepted: equal, equal up to a convention that is named, or, in nu and gamma, equal
     on the constraint manifold; 1 where one is not.
     """
@@ -46,7 +61,10 @@ def command(
     for path in filter(None, (output, gradescope)):
         require_output(path, model, "the model itself")
         require_output(path, hand, "the file to compare")
-    report = kc.compare_file(read_model(model), hand, constraint=constraint, strict=strict)
+    read: Any = read_model(model)
+    if ends := transmission or _ends(model, hand):
+        read = kc.transmission(read, *ends)
+    report = kc.compare_file(read, hand, constraint=constraint, strict=strict)
     if output is not None:
         write_atomically(output, getattr(report, writers[Path(output).suffix])(reveal))
     if gradescope is not None:
@@ -59,6 +77,26 @@ def command(
         click.echo(f"{report.summary}\nWrote {output}", err=True)
     if not report.equal:
         context.exit(DIFFERENT)
+
+
+def _ends(model: str, hand: str) -> Ends | None:
+    """Return inputs and outputs, from HAND or else MODEL, where HAND is of a transmission."""
+    from kincompile.checker.hand_file import read_hand_file
+    from kincompile.checker.reference import OF_TRANSMISSIONS
+    from kincompile.design.task_tables import read_transmission
+
+    file = read_hand_file(hand)
+    own = [name for name in file.quantities if name in OF_TRANSMISSIONS]
+    if file.transmission is not None or not own:
+        return file.transmission
+    try:
+        table = read_transmission(model)
+    except InputError as error:
+        raise InputError(
+            f"{listed(own)}: say of what function, with --transmission INPUTS:OUTPUTS or a line "
+            f"transmission = INPUTS:OUTPUTS in {hand}. {error}"
+        ) from error
+    return table["inputs"], table["outputs"]
 
 
 def _print_coloured(table: Any) -> None:

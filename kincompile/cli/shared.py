@@ -12,6 +12,7 @@ import click
 import kincompile as kc
 from kincompile.errors import InputError
 from kincompile.model.declared import declared_fields
+from kincompile.names import transmission_ends
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
@@ -73,15 +74,14 @@ def transmission_option(text: str) -> Callable[[Command], Command]:
 def _ends(context: click.Context, option: click.Parameter, given: str | None) -> Ends | None:
     """Return the names of inputs and of outputs."""
     del context, option
+    if given is not None and (ends := transmission_ends(given)) is not None:
+        return ends
     if given is None:
         return None
-    parts = [[name.strip() for name in part.split(",")] for part in given.split(":")]
-    if len(parts) != 2 or not all(name for part in parts for name in part):
-        raise InputError(
-            f"--transmission {given} is not of the form INPUTS:OUTPUTS; write names with commas, "
-            "as left,right:pitch,roll"
-        )
-    return parts[0], parts[1]
+    raise InputError(
+        f"--transmission {given} is not of the form INPUTS:OUTPUTS; write names with commas, "
+        "as left,right:pitch,roll"
+    )
 
 
 def table_options(table: type) -> Callable[[Command], Command]:

@@ -94,7 +94,10 @@ class _Drawing:
         reference, columns = self._reference, range(len(self._system.coordinates))
         places = [(row, k) for row in reference.block(name).rows for k in columns]
         places = [x for x in places if self._Phi_q[x] != 0]
-        typed = {x: TypedEntry(reference, "Phi_q", *x, reference.random) for x in places}
+        typed = {
+            x: TypedEntry(reference, "Phi_q", reference.expression("Phi_q", *x), reference.random)
+            for x in places
+        }
         fair = [x for x in places if is_fair(self._Phi_q[x])]
         own = {x for row in reference.block(name).rows for x in self._Phi[row].free_symbols}
         self.random.shuffle(fair)

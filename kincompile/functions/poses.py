@@ -224,6 +224,11 @@ class Poses(Shown):
         with np.errstate(divide="ignore"):
             return np.asarray(1 / (2 * np.linalg.norm(fastest, axis=-1)))
 
+    @property
+    def q_u(self) -> Array:
+        """Derivatives of all coordinates by the inputs, (..., coordinates, m)."""
+        return self._of_all(second=False)[0]
+
     def _of_all(self, *, second: bool) -> tuple[Array, Any]:
         """Return derivatives of all coordinates by the inputs."""
         names = self.signature.parameters

@@ -66,6 +66,7 @@ RUNTIME = "runtime"
 DEFERRED = {
     PACKAGE,
     "kincompile.cli",
+    "kincompile.cli.compare",
     "kincompile.cli.fit",
     "kincompile.cli.motion",
     "kincompile.cli.sweep",

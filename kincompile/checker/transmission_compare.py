@@ -1,0 +1,109 @@
+"""Comparison of the maps of a transmission, as `compare` and `compare_file` are asked for it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from kincompile.checker.comparer import NUMBERS
+from kincompile.checker.transmission_comparer import TransmissionComparer
+from kincompile.checker.written import (
+    REPORTED,
+    argument_names,
+    from_function,
+    read_written,
+    vocabulary,
+)
+from kincompile.errors import InputError
+from kincompile.names import listed
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike
+
+    from kincompile.checker.conventions import Stated
+    from kincompile.checker.report import Report
+    from kincompile.checker.transmission_reference import TransmissionReference
+    from kincompile.checker.written import Written
+
+Readings = dict[str, list["Written"]]
+
+
+def read_maps(
+    reference: TransmissionReference,
+    given: Mapping[str, object],
+    aliases: Mapping[str, object],
+    *,
+    at_states: bool = False,
+) -> Readings:
+    """Read all quantities, each in the ways in which it may be meant; or raise all problems.
+
+    A function of one argument may be of the inputs or of the outputs.
+    """
+    words = vocabulary(reference, aliases)
+    readings: Readings = {}
+    problems: list[str] = []
+    for name, value in given.items():
+
+        def check(rows: int, columns: int, name: str = name) -> list[str]:
+            return _shape_problems(reference, name, rows, columns)
+
+        try:
+            if callable(value) and not hasattr(value, "free_symbols"):
+                choices = reference.arguments(name, argument_names(value))
+                readings[name] = [from_function(name, value, reference, item) for item in choices]
+            else:
+                readings[name] = [read_written(name, value, words, reference, at_states, check)]
+            problems += check(*readings[name][0].shape)
+        except InputError as error:
+            problems += [item for item in error.problems if item != REPORTED]
+    if problems:
+        raise InputError(problems)
+    return readings
+
+
+def _shape_problems(
+    reference: TransmissionReference, name: str, rows: int, columns: int
+) -> list[str]:
+    """Return what is wrong with the shape of a quantity."""
+    f = reference.f
+    m, n = len(f.inputs), len(f.outputs)
+    if name in ("J", "J_dot"):
+        if (rows, columns) in ((n, m), (m, n)):
+            return []
+        return [
+            f"{name} is {rows} x {columns}; expected {n} x {m}, a row for each of "
+            f"{listed(f.outputs)} and a column for each of {listed(f.inputs)}, or its transpose"
+        ]
+    counts = {n: f.outputs} if name == "x" else {m: f.inputs}
+    if name == "effort" and m == n:
+        counts = {m: f.inputs}
+    if columns == 1 and rows in counts:
+        return []
+    ((count, names),) = counts.items()
+    return [
+        f"{name} is {rows} x {columns}; it is a vector: expected {count} rows, one for each of "
+        f"{listed(names)}"
+    ]
+
+
+def compare_maps(
+    reference: TransmissionReference,
+    readings: Readings,
+    given: Mapping[str, ArrayLike] | None,
+    stated: Stated,
+    *,
+    strict: bool,
+) -> Report:
+    """Compare at random poses; where numbers may stand for parameters, at their defaults too."""
+    if given is not None:
+        states = reference.given_states(given)
+        return TransmissionComparer(reference, readings, states, stated, strict).report()
+    takes = all(item.takes_parameters for own in readings.values() for item in own)
+    states = reference.random if takes else reference.fixed
+    best = TransmissionComparer(reference, readings, states, stated, strict)
+    if best.wrong_count and reference.own and states is not reference.fixed:
+        other = TransmissionComparer(reference, readings, reference.fixed, stated, strict)
+        if other.wrong_count < best.wrong_count:
+            return other.report(NUMBERS)
+    return best.report()

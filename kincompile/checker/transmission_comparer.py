@@ -1,0 +1,456 @@
+"""J, J_dot, effort and x by hand against those of a transmission: laid out, judged, explained."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import permutations
+from typing import TYPE_CHECKING
+
+import numpy as np
+import sympy
+
+from kincompile.checker.agreement import (
+    OF_ROW,
+    ON_MANIFOLD,
+    Given,
+    Right,
+    agrees,
+    finite,
+    is_close,
+    is_undecided,
+    tolerance,
+)
+from kincompile.checker.comparer import UNEXPLAINED
+from kincompile.checker.comparison import ComparedEntry, Convention, Diagnosis, Verdict
+from kincompile.checker.conventions import LOAD
+from kincompile.checker.diagnosis import defined, looked_up, undecided_diagnosis
+from kincompile.checker.entry_faults import TypedEntry
+from kincompile.checker.fault import Fault, Kind
+from kincompile.checker.report import Report
+from kincompile.checker.transmission_faults import (
+    HandEntry,
+    Matrix,
+    MatrixFaults,
+    misread,
+    missing_terms,
+)
+from kincompile.checker.transmission_maps import KINDS, Map, maps_at, turned
+from kincompile.model.expressions import symbol_names
+from kincompile.names import listed, rate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from kincompile.checker.conventions import Stated
+    from kincompile.checker.joint_faults import Index, NumericFault
+    from kincompile.checker.states import Array
+    from kincompile.checker.transmission_reference import PoseStates, TransmissionReference
+    from kincompile.checker.written import Written
+
+MOST_PERMUTED = 6
+NOT_ENERGY = "energy is not conserved: effort is not J^T of the velocities"
+
+
+@dataclass(frozen=True, eq=False)
+class Laid:
+    """A quantity by hand as it is laid out, with the right values in that order."""
+
+    quantity: str
+    written: Written
+    given: Given
+    right: Right
+    map: Map
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+
+    @cached_property
+    def equal(self) -> Array:
+        """Which entries are right at all states, (rows, columns)."""
+        return np.asarray(np.all(agrees(self.given, self.right), axis=0))
+
+    @property
+    def wrong_count(self) -> int:
+        """The number of entries that differ."""
+        return int((~self.equal).sum())
+
+    @property
+    def row_names(self) -> tuple[str, ...]:
+        """Names of the rows as written."""
+        return tuple(self.map.rows[k] for k in self.rows)
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """Names of the columns as written."""
+        return tuple(self.map.columns[k] for k in self.columns)
+
+    def conventions(self) -> Iterator[Convention]:
+        """Yield what is another way of writing."""
+        if text := KINDS.get(self.map.kind, ""):
+            yield Convention(self.map.kind, f"{self.quantity}: {text}.")
+        if np.any(
+            self.right.values != self.map.right.values[:, list(self.rows)][:, :, list(self.columns)]
+        ):
+            text = f"{self.quantity}: angles are those of the mechanism but for whole turns."
+            yield Convention("whole turns", text)
+        for what, order, names in (
+            ("rows", self.rows, self.row_names),
+            ("columns", self.columns, self.column_names),
+        ):
+            if list(order) != sorted(order):
+                text = f"{self.quantity}: the {what} have another order: {listed(names, 30)}."
+                yield Convention(f"order of {what}", text)
+
+
+class TransmissionComparer:
+    """One comparison at some poses, from the layout to the report."""
+
+    def __init__(
+        self,
+        reference: TransmissionReference,
+        readings: Mapping[str, Sequence[Written]],
+        states: PoseStates,
+        stated: Stated,
+        strict: bool,
+    ) -> None:
+        self._reference, self._states = reference, states
+        self._stated, self._strict = stated, strict
+        self._maps = maps_at(
+            reference, states, with_rates="J_dot" in readings, is_load=stated.is_load
+        )
+        self._faults = MatrixFaults(reference, states)
+        self._laid: dict[str, Laid] = {}
+        for name, written in readings.items():
+            self._laid[name] = self._best(name, written)
+
+    @property
+    def wrong_count(self) -> int:
+        """The number of entries that differ."""
+        return sum(item.wrong_count for item in self._laid.values())
+
+    def report(self, convention: Convention | None = None) -> Report:
+        """Return the outcome."""
+        found = [convention] if convention else []
+        entries: list[ComparedEntry] = []
+        for laid in self._laid.values():
+            own = [*found[:1], *laid.conventions()] if convention else [*laid.conventions()]
+            exact = np.all(agrees(laid.given.exact, laid.right), axis=0)
+            if np.any(laid.equal & ~exact):
+                text = f"{laid.quantity}: {laid.written.rounding}."
+                found.append(Convention("rounded numbers", text))
+            found += [item for item in own if item not in found]
+            entries += self._entries(laid, exact, bool(own))
+        return Report(self._reference.f.name, None, tuple(entries), tuple(found))
+
+    def _best(self, name: str, readings: Sequence[Written]) -> Laid:
+        """Return the layout with the fewest mistakes, the plain one first."""
+        best: Laid | None = None
+        for written in readings:
+            given = written.evaluate(self._states)
+            for item in self._candidates(name, written):
+                if written.shape != (len(item.rows), len(item.columns)):
+                    continue
+                right = item.right
+                if name == "x":
+                    right = turned(given.values, right, self._angular)
+                found = self._ordered(Laid(
+                    name, written, given, right, item,
+                    tuple(range(len(item.rows))), tuple(range(len(item.columns))),
+                ))  # fmt: skip
+                if best is None or _is_better(found, best):
+                    best = found
+        assert best is not None, "shapes are checked before"
+        return best
+
+    @cached_property
+    def _angular(self) -> Array:
+        """Which outputs are angles, (n,)."""
+        f = self._reference.f
+        return np.array([f.units[name] == "rad" for name in f.outputs])
+
+    def _candidates(self, name: str, written: Written) -> list[Map]:
+        """Return the maps that a quantity may be: the one that is stated, or all."""
+        found = self._maps[name]
+        if name == "effort" and len(found) > 1:
+            named = [item for item in found if item.effort in written.arguments]
+            uses = any(written.uses(f"tau_{item}") for item in self._reference.f.outputs)
+            return named or (found[:1] if uses else found)
+        if name not in ("J", "J_dot"):
+            return found
+        stated = self._stated.kind or (found[0].kind if self._strict else "")
+        laid = self._laid.get("J")
+        if name == "J_dot" and laid is not None and not laid.wrong_count:
+            stated = laid.map.kind  # it is the rate of that J
+        return [item for item in found if stated in ("", item.kind)]
+
+    def _ordered(self, plain: Laid) -> Laid:
+        """Return rows and columns in the order in which they are right, if there is one."""
+        best, (count, width) = plain, plain.equal.shape
+        if self._strict or not plain.wrong_count or max(count, width) > MOST_PERMUTED:
+            return best
+        for columns in permutations(range(width)) if count > 1 else [plain.columns]:
+            right = plain.right[:, :, list(columns)]
+            match = np.array([
+                [bool(np.all(agrees(plain.given[:, i], right[:, k]))) for k in range(count)]
+                for i in range(count)
+            ])  # fmt: skip
+            rows = _rows(match)
+            other = replace(plain, right=right[:, list(rows)], rows=rows, columns=columns)
+            if _is_better(other, best):
+                best = other
+        return best
+
+    def _entries(self, laid: Laid, exact: Array, is_convention: bool) -> Iterator[ComparedEntry]:
+        """Yield all entries of a quantity."""
+        diagnoses = self._diagnoses(laid)
+        undecided = np.all(agrees(laid.given, laid.right) | is_undecided(laid.given, laid.right), 0)
+        for place in np.ndindex(*laid.equal.shape):
+            row, column = place
+            given = laid.given[:, row, column]
+            values = given.values, laid.right.values[:, row, column]
+            if laid.equal[place]:
+                is_plain = exact[place] and not is_convention
+                verdict = Verdict.EQUAL if is_plain else Verdict.CONVENTION
+            elif undecided[place]:
+                verdict = Verdict.UNDECIDED
+                diagnoses[place] = (undecided_diagnosis(given),)
+            else:
+                verdict = Verdict.DIFFERENT
+            accepted = verdict is Verdict.EQUAL or (verdict.is_right and not self._strict)
+            yield ComparedEntry(
+                laid.quantity,
+                laid.row_names[row],
+                laid.column_names[column] if laid.map.is_matrix else None,
+                self._later(values[1]),
+                laid.written.texts[row][column],
+                verdict,
+                accepted,
+                diagnoses.get(place, ()),
+                None if accepted else self._reference.difference(self._states, *values),
+            )
+
+    def _later(self, right: Array) -> Callable[[], str]:
+        """Return what gives a right value as text: a loop's formula is known by numbers alone."""
+        inputs = zip(self._reference.f.inputs, self._states.u[0], strict=True)
+        where = ", ".join(f"{name} = {value:.6g}" for name, value in inputs)
+        return lambda: f"{right[0]:.9g} at {where}"
+
+    def _diagnoses(self, laid: Laid) -> dict[Index, tuple[Diagnosis, ...]]:
+        """Return the explanations of the entries that differ."""
+        wrong = [(i, j) for i, j in np.ndindex(*laid.equal.shape) if not laid.equal[i, j]]
+        if not wrong:
+            return {}
+        lost = tolerance(laid.given, laid.right)
+        written = {(i, j): (laid.given.values[:, i, j], lost[:, i, j]) for i, j in wrong}
+        left, found = defined(written)
+
+        def entry_of(place: Index) -> HandEntry:
+            expression, (i, j) = laid.written.formula(*place), place
+            typed = expression is not None and TypedEntry(
+                self._reference, laid.quantity, expression, self._states, is_by_hand=True
+            )
+            right = laid.right.values[:, i, j], lost[:, i, j]
+            return HandEntry(typed or None, right, written[place][0])
+
+        entries = {place: entry_of(place) for place in left}
+        faults = [*self._of_matrix(laid)]
+        found |= looked_up(
+            left, laid.right.values, faults, [*self._of_names(laid)], entries.__getitem__, tuple
+        )
+        unexplained = (self._unexplained(laid),)
+        found = {place: found[place] or unexplained for place in wrong}
+        added = self._energy.get(laid.quantity, "")
+        return {
+            place: tuple(
+                replace(item, text=f"{item.text.removesuffix('.')}; {added}.") if added else item
+                for item in items
+            )
+            for place, items in found.items()
+        }
+
+    def _unexplained(self, laid: Laid) -> Diagnosis:
+        """Return the sentence about an entry outside the catalogue."""
+        if laid.quantity == "x" and self._is_another_assembly(laid):
+            text = "these are the outputs of another assembly, on another branch."
+            return Diagnosis(Kind.BRANCH, text)
+        text = "no fault of the catalogue fits."
+        if not laid.written.arguments and laid.written.expressions is None:
+            text += " The values of an array belong to states: give states={'u': ...}."
+        return Diagnosis(UNEXPLAINED, text)
+
+    def _is_another_assembly(self, laid: Laid) -> bool:
+        """Return whether outputs are those of another assembly, at two poses."""
+        f, states, own = self._reference.f, self._states, self._reference.own
+        for k in range(min(2, len(states))):
+            p = dict(zip(own, states.p[k], strict=False))
+            given = laid.given.values[k, :, 0]
+            others = f.assemblies(states.u[k], p=p)[:, list(laid.rows)]
+            off = others - given
+            turns = np.round(off / (2 * np.pi)) * self._angular[list(laid.rows)]
+            off = np.abs(off - 2 * np.pi * turns)
+            if not np.any(np.all(off <= ON_MANIFOLD * (1 + np.abs(given)), axis=-1)):
+                return False
+        return True
+
+    def _of_names(self, laid: Laid) -> Iterator[NumericFault]:
+        if laid.written.takes_states:
+            yield from misread(self._reference, self._states, laid.written, laid.right.values)
+
+    def _of_matrix(self, laid: Laid) -> Iterator[NumericFault]:
+        """Yield the faults of a whole quantity."""
+        matrix = Matrix(
+            laid.quantity, laid.given.values, laid.right.values, laid.row_names, laid.column_names
+        )
+        for other in self._maps[laid.quantity] if laid.map.is_matrix else ():
+            if other.kind != laid.map.kind and other.right.values.shape == matrix.right.shape:
+                kind = Kind.INVERSE if "du/dx" in other.kind else Kind.WHOLE_TRANSPOSED
+                text = f"{KINDS[other.kind] or 'this is J: dx/du'}, and not {laid.map.kind}"
+                if laid.quantity == "J_dot":
+                    text = f"this is the rate of {other.kind}, and not that of {laid.map.kind}"
+                yield from matrix.fault(kind, text, other.right.values)
+        if laid.quantity == "effort":
+            yield from self._of_effort(laid)
+        if laid.quantity == "J_dot":
+            yield from missing_terms(self._terms(laid), matrix)
+        yield from self._faults.of(matrix)
+
+    def _terms(self, laid: Laid) -> dict[str, Array]:
+        """Return the terms of J_dot by rate, in the author's J if that is right, else by inputs."""
+        order, velocities = np.ix_(laid.rows, laid.columns), self._laid.get("J")
+        names, own = [*map(rate, self._reference.f.inputs)], {}
+        for name, item in zip(names, laid.map.terms, strict=True):
+            own[name] = item[:, order[0], order[1]]
+        known = (
+            velocities is not None
+            and not velocities.wrong_count
+            and velocities.map.kind == laid.map.kind
+        )
+        if velocities is None or not known or velocities.written.expressions is None:
+            return own
+        places = {
+            (row, column): velocities.written.formula(i, k)
+            for i, row in enumerate(velocities.row_names)
+            for k, column in enumerate(velocities.column_names)
+        }
+        rows, columns = laid.row_names, laid.column_names
+        formulas = [places[row, column] for row in rows for column in columns]
+        values = self._reference.inputs(self._states)
+        symbols = {item for formula in formulas if formula for item in symbol_names(formula)}
+        for symbol in sorted(symbols):
+            if (name := rate(symbol)) in values:
+                slopes = [sympy.diff(item, sympy.Symbol(symbol)) for item in formulas]
+                found = self._reference.evaluate(slopes, self._states)[0] * values[name][:, None]
+                own[name] = found.reshape(-1, len(rows), len(columns))
+        return own
+
+    def _of_effort(self, laid: Laid) -> Iterator[NumericFault]:
+        """Yield the faults of the matrix that effort is of the other side's efforts."""
+        vector = Matrix(
+            "effort", laid.given.values, laid.right.values, laid.row_names, laid.column_names
+        )
+        text = "effort has the wrong sign"
+        if not self._stated.is_load:
+            text += f'; if {laid.map.effort} is a load, state effort = "{LOAD}" in [conventions]'
+        yield from vector.fault(Kind.SIGN, text, -laid.right.values)
+        matrix = self._effort_matrix(laid)
+        if matrix is None:
+            return
+        f, tau, right = self._reference.f, laid.map.tau, laid.map.matrix
+        transposed = np.swapaxes(right, 1, 2)
+        ends = f.outputs if laid.map.effort == "tau_x" else f.inputs
+        names = tuple(f"tau_{name}" for name in ends)
+        right_rows = right[:, list(laid.rows)]
+        own = Matrix("effort", matrix, right_rows, laid.row_names, names, is_of_terms=True)
+        if right.shape[1] == right.shape[2]:
+            inverse = np.linalg.inv(right)
+            for kind, text, other in (
+                (Kind.WHOLE_TRANSPOSED, "J", transposed),
+                (Kind.INVERSE, "the inverse of J", np.swapaxes(inverse, 1, 2)),
+                (Kind.INVERSE, "the transpose of the inverse of J", inverse),
+            ):
+                values = (other @ tau[..., None])[:, list(laid.rows)]
+                yield from vector.fault(kind, f"{text} stands where J^T belongs", values)
+        # A fault of some entries of the matrix shows in the rows of effort in which they are.
+        for fault in self._faults.of(own):
+            values = own.right.copy()
+            for (i, j), item in fault.result.items():
+                values[:, i, j] = item
+            if all(
+                is_close(values[:, i, j], own.given[:, i, j])
+                for i in {i for i, _ in fault.result}
+                for j in range(values.shape[2])
+            ):
+                rows = {(i, 0): laid.given.values[:, i, 0] for i, _ in fault.result}
+                yield Fault(fault.kind, fault.text, rows)
+
+    def _effort_matrix(self, laid: Laid) -> Array | None:
+        """Return the matrix by hand, (N, rows, columns), None where effort is no such product."""
+        if not laid.written.takes_states:
+            return None
+        tau = laid.map.tau
+        columns = []
+        for unit in np.eye(tau.shape[1]):
+            changed = replace(self._states, **{laid.map.effort: np.tile(unit, (len(tau), 1))})
+            columns.append(laid.written.evaluate(changed).values[:, :, 0])
+        matrix = np.stack(columns, axis=-1)
+        found = np.einsum("kij,kj->ki", matrix, tau)
+        lost = tolerance(laid.given, laid.right)[:, :, 0]
+        off = np.abs(found - laid.given.values[:, :, 0])
+        return matrix if np.all(off <= 10 * (lost + finite(OF_ROW * np.abs(found)))) else None
+
+    @cached_property
+    def _energy(self) -> dict[str, str]:
+        """What is to be said of J and effort where they do not belong together."""
+        velocities, effort = self._laid.get("J"), self._laid.get("effort")
+        if effort is None or (
+            not effort.wrong_count and (velocities is None or not velocities.wrong_count)
+        ):
+            return {}
+        if velocities is None:
+            return {"effort": NOT_ENERGY}
+        if not velocities.wrong_count:
+            return {"effort": f"{NOT_ENERGY}; J is right"}
+        if not effort.wrong_count:
+            return {"J": f"{NOT_ENERGY}; effort is right"}
+        if self._belongs(velocities, effort):
+            return {"effort": "it is J^T of your J, which is wrong: energy is conserved"}
+        return {"effort": NOT_ENERGY}
+
+    def _belongs(self, velocities: Laid, effort: Laid) -> bool:
+        """Return whether the effort by hand is J^T of the J by hand."""
+        matrix = self._effort_matrix(effort)
+        own = np.empty_like(velocities.map.right.values)
+        own[:, np.array(velocities.rows)[:, None], np.array(velocities.columns)] = (
+            velocities.given.values
+        )
+        own = velocities.map.as_J(own)
+        if matrix is None or effort.map.effort != "tau_x":
+            return False
+        by_row = np.empty_like(matrix)
+        by_row[:, list(effort.rows)] = matrix
+        return all(
+            is_close(by_row[:, i, j], own[:, j, i]) for i, j in np.ndindex(*by_row.shape[1:])
+        )
+
+
+def _rows(match: Array) -> tuple[int, ...]:
+    """Return the right row of each row by hand: where it matches, else its own or what is left."""
+    found: dict[int, int] = {}
+    for i, own in enumerate(match):
+        free = [int(k) for k in np.flatnonzero(own) if k not in found.values()]
+        if free:
+            found[i] = i if i in free else free[0]
+    for i in range(len(match)):
+        if i not in found:
+            rest = [k for k in range(len(match)) if k not in found.values()]
+            found[i] = i if i in rest else rest[0]
+    return tuple(found[i] for i in range(len(match)))
+
+
+def _is_better(other: Laid, best: Laid) -> bool:
+    """Return whether a layout explains all that another one does, and most of the rest."""
+    if other.wrong_count >= best.wrong_count:
+        return False
+    is_most = 2 * other.wrong_count <= other.equal.size
+    same = other.equal.shape == best.equal.shape
+    return is_most and (not same or bool(np.all(other.equal[best.equal])))
