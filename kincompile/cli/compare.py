@@ -15,6 +15,7 @@ from kincompile.cli.shared import (
     print_data,
     read_model,
     require_output,
+    tabled_ends,
     transmission_option,
 )
 from kincompile.errors import InputError
@@ -83,20 +84,17 @@ def _ends(model: str, hand: str) -> Ends | None:
     """Return inputs and outputs, from HAND or else MODEL, where HAND is of a transmission."""
     from kincompile.checker.hand_file import read_hand_file
     from kincompile.checker.reference import OF_TRANSMISSIONS
-    from kincompile.design.task_tables import read_transmission
 
     file = read_hand_file(hand)
     own = [name for name in file.quantities if name in OF_TRANSMISSIONS]
     if file.transmission is not None or not own:
         return file.transmission
-    try:
-        table = read_transmission(model)
-    except InputError as error:
-        raise InputError(
-            f"{listed(own)}: say of what function, with --transmission INPUTS:OUTPUTS or a line "
-            f"transmission = INPUTS:OUTPUTS in {hand}. {error}"
-        ) from error
-    return table["inputs"], table["outputs"]
+    if (ends := tabled_ends(model)) is not None:
+        return ends
+    raise InputError(
+        f"{listed(own)}: say of which function, with --transmission INPUTS:OUTPUTS, a line "
+        f"transmission = INPUTS:OUTPUTS in {hand}, or a table [transmission] in {model}"
+    )
 
 
 def _print_coloured(table: Any) -> None:

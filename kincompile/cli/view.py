@@ -14,12 +14,11 @@ from kincompile.cli.shared import (
     deg_option,
     output_option,
     read_model,
+    tabled_ends,
     transmission_option,
 )
 from kincompile.cli.watch import follow
-from kincompile.design.task_tables import read_transmission
 from kincompile.errors import InputError
-from kincompile.files.sweep_table import task_reader
 from kincompile.writing import require_writable
 
 if TYPE_CHECKING:
@@ -75,7 +74,7 @@ def command(
     pages = []
     for path, model in zip(models, read, strict=True):
         numbers = motion.numbers(model)
-        options["transmission"] = transmission or _tabled(path)
+        options["transmission"] = transmission or tabled_ends(path)
         pages.append(kc.page(model, t=motion.times(model, numbers), p=numbers, **options))
     written = [pages[0].write(output)] if is_page else kc.gallery(pages).write(output)
     for path in written:
@@ -85,14 +84,6 @@ def command(
         click.echo(f"Error: {item.message}", err=True)
     if failed:
         context.exit(NOT_CONVERGED)
-
-
-def _tabled(model: str) -> Ends | None:
-    """Return inputs and outputs of the table [transmission] of a model, None without it."""
-    if task_reader(model, "transmission") is None:
-        return None
-    given = read_transmission(model)
-    return given["inputs"], given["outputs"]
 
 
 def _watch(context: click.Context, models: tuple[str, ...], output: str | None) -> None:

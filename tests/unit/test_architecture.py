@@ -69,6 +69,7 @@ DEFERRED = {
     "kincompile.cli.compare",
     "kincompile.cli.fit",
     "kincompile.cli.motion",
+    "kincompile.cli.shared",
     "kincompile.cli.sweep",
     "kincompile.cli.tolerance",
     "kincompile.cli.transmission",
