@@ -247,17 +247,25 @@ const transmission = {
 
   /* ---- the map ---- */
 
+  /* What goes up in the map: the second input, or the first output; of an angular velocity, which has no value, the derivative. */
+  upright() {
+    const { inputs, outputs: [first] } = player.data.transmission;
+    if (inputs[1]) return { ...inputs[1], of: pose => pose.u[1] };
+    if (Number.isFinite(this.branch.home.x[0])) return { ...first, of: pose => pose.x[0] };
+    return { name: `d ${first.name}/d ${inputs[0].name}`, unit: '', of: pose => pose.J[0][0] };
+  },
+
   /* From inputs, or an input and the first output, to the chart. */
   chart() {
     const { map } = this, [x] = map.box, { width, height, left, right, top, low } = CHART;
-    const values = map.poses.map(pose => pose.x[0]);
+    const second = this.upright(), values = map.poses.map(second.of);
     const spread = [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))];
     const padded = range => range.map((end, side) => end + (side ? 0.05 : -0.05) * (range[1] - range[0] || 20));
     const [across, up] = [padded(x), padded(map.box[1] ?? spread)];
     const place = (value, range, from, to) => from + (value - range[0]) / (range[1] - range[0]) * (to - from);
     return {
-      across, up,
-      at: pose => [place(pose.u[0], across, left, width - right), place(pose.u[1] ?? pose.x[0], up, height - low, top)],
+      across, up, second,
+      at: pose => [place(pose.u[0], across, left, width - right), place(second.of(pose), up, height - low, top)],
       inputs: ([a, b]) => [across[0] + (a - left) / (width - right - left) * (across[1] - across[0]),
         up[0] + (height - low - b) / (height - low - top) * (up[1] - up[0])].slice(0, map.box.length),
     };
@@ -289,9 +297,9 @@ const transmission = {
     return this.isPlane ? `${count ? '' : 'no '}${what}${count ? ' as curves' : ''}` : `${count} ${what}`;
   },
 
-  background({ across, up, at }) {
+  background({ across, up, second, at }) {
     const { width, height, left, right, top, low } = CHART, { map } = this;
-    const { inputs, outputs } = player.data.transmission;
+    const { inputs } = player.data.transmission;
     /** @param {any} more */
     const write = (text, x, y, anchor, more = {}) => svgElement('text', { x, y, 'text-anchor': anchor, ...more }, text);
     const path = (className, pieces, end = '') => svgElement('path', {
@@ -301,7 +309,6 @@ const transmission = {
       const factor = units.factor(unit), [a, b] = range.map(x => x * factor), step = niceStep((b - a) * SCARCE / length);
       return multiples(step, a, b).map(x => [(x / factor - range[0]) / (range[1] - range[0]), stepText(x, step)]);
     };
-    const second = inputs[1] ?? outputs[0];
     const frame = svgElement('rect', { class: 'frame', x: left, y: top, width: width - left - right, height: height - top - low });
     const scaleX = ticks(across, inputs[0].unit, width - left - right).map(([part, text]) =>
       write(text, left + part * (width - left - right), height - low + 13, 'middle'));

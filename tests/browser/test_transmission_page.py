@@ -226,6 +226,23 @@ def test_that_the_point_is_dragged_in_the_map(open_case: Callable[..., Any]) -> 
     page.close()
 
 
+def test_that_a_velocity_has_a_derivative_and_no_value(
+    open_file: Callable[..., Any], tmp_path: Path
+) -> None:
+    m = models.crank_rocker()
+    rocker = next(body for body in m.system().bodies if body.name == "rocker")
+    m.output("swing", kc.outputs.rate(rocker.phi), "rad/s")
+    page = open_file(kc.page(m, transmission=(["motor"], ["swing"])).write(tmp_path / "page.html"))
+    page.wait_for_function("transmission.map !== null")
+    assert not any(x.isalnum() for x in page.inner_text(".outputs td"))
+    slope = kc.transmission(models.crank_rocker(), "motor", "phi_rocker").J([1.5])[0, 0]
+    assert page.evaluate("transmission.found.J[0][0]") == pytest.approx(slope, rel=1e-9)
+    assert page.locator(".map .title").all_text_contents()[1] == "d swing/d motor"
+    assert len(curves(page, "input")) == 2
+    assert page.said == []
+    page.close()
+
+
 def test_that_parameters_that_are_pulled_change_the_function(
     open_case: Callable[..., Any],
 ) -> None:
