@@ -87,11 +87,12 @@ def _ends(context: click.Context, option: click.Parameter, given: str | None) ->
 def tabled_ends(model: str) -> Ends | None:
     """Return inputs and outputs of the table [transmission] of a model, None without it."""
     # SymPy, which the help of a command does not need.
-    from kincompile.design.task_tables import read_transmission
     from kincompile.files.sweep_table import task_reader
 
     if task_reader(model, "transmission") is None:
         return None
+    from kincompile.design.task_tables import read_transmission  # SciPy
+
     given = read_transmission(model)
     return given["inputs"], given["outputs"]
 

@@ -6,12 +6,12 @@ import json
 import shutil
 import tempfile
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import InputError
 from kincompile.exercises.blanks import PLACE, Blank, choose_blanks
-from kincompile.exercises.mistakes import Mistake, choose_mistakes
 from kincompile.exercises.sheet import sheet, solutions
 from kincompile.exercises.variants import Choices, variants
 from kincompile.model.mechanism import Mechanism
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
 
+    from kincompile.exercises.mistakes import Mistake
     from kincompile.model.system import ConstraintSystem
 
 FORMAT = 2
@@ -202,7 +203,10 @@ def exercise(
     if not mistakes:
         blanks = choose_blanks(made[0].system(), seed)
         return ExerciseKit(model.name, (blanks,) * students, tuple(made), ((),) * students)
-    slips = [choose_mistakes(x.system(), f"{seed}-{k}") for k, x in enumerate(made, start=1)]
+    drawing = import_module("kincompile.exercises.mistakes")  # it loads the checker
+    slips = [
+        drawing.choose_mistakes(x.system(), f"{seed}-{k}") for k, x in enumerate(made, start=1)
+    ]
     filled = tuple(tuple(x for item in own for x in (item.place, item.entry)) for own in slips)
     return ExerciseKit(model.name, filled, tuple(made), tuple(slips))
 

@@ -74,6 +74,7 @@ DEFERRED = {
     "kincompile.cli.tolerance",
     "kincompile.cli.transmission",
     "kincompile.compiler",
+    "kincompile.exercises.kit",
     "kincompile.files.dimensions",
     "kincompile.files.file_format",
     "kincompile.files.model_file",
