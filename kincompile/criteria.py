@@ -306,6 +306,16 @@ SUFFICIENT = 1e-4
 SHORTEST_STEP = 2.0**-20
 """A step shortened to this part without a decrease is at a minimum of the residual."""
 
+ASSEMBLES, FALLING, STATIONARY = 1e-6, 0.9, 0.1
+"""Of attempts by many sets: what equations are missed by, relative to their terms, up to which one
+may lead to a position; the part of itself to which that must fall over three steps, or it
+oscillates around a minimum; and the part of its square by which it would fall at least if equations
+were linear: less only at a minimum, since where they can hold it is nearly all."""
+
+TOO_STEEP, INVERSE_ITERATIONS = 1e100, 25
+"""Entry of Phi_q with whose square nothing can be solved; iterations that lead to its smallest
+singular value."""
+
 DAMPING, LESS_DAMPING, MORE_DAMPING = (1e-13, 1e-3, 1e3), 0.1, 8.0
 """Least, first and largest damping of Levenberg's and Marquardt's steps, in squares of scales, and
 its factors after a step that lowers the residual, and after one that does not."""

@@ -142,6 +142,25 @@ typedef struct {
 // Follow the motions; returns how many variants converged at all times.
 size_t cam_by_table_march_variants(const cam_by_table_variants *all);
 
+// The same, but one that is assembled with an angle farther from its guess is not followed: its
+// status at the first time says that it is assembled.
+size_t cam_by_table_follow_variants(const cam_by_table_variants *all, double farthest);
+
+// Make a safeguarded attempt from the guess of each, at the first time. Written are where it ends, q,
+// and a status: CAM_BY_TABLE_CONVERGED where a position may be so near that plain steps lead to it,
+// CAM_BY_TABLE_NOT_CONVERGED where the variant cannot be assembled from there.
+void cam_by_table_attempt_variants(const cam_by_table_variants *all);
+
+// Write, q, about where variants can be assembled beyond the singular positions nearest to guesses
+// that are positions; what is not finite cannot be said. Equations are measured by what their terms
+// contribute, 7 numbers.
+void cam_by_table_mirror_variants(const cam_by_table_variants *all, const double *magnitude);
+
+// Lead positions at the first time from the parameters of the variants, the same for all, along
+// straight lines to others, 1 a variant. They stay on their branch. Written is what became of
+// each: CAM_BY_TABLE_LOCK_UP where its branch ends on the way.
+void cam_by_table_lead_variants(const cam_by_table_variants *all, cam_by_table_input ends);
+
 #ifdef __cplusplus
 }
 #endif

@@ -139,6 +139,25 @@ typedef struct {
 // Follow the motions; returns how many variants converged at all times.
 size_t problem_3_5_6_march_variants(const problem_3_5_6_variants *all);
 
+// The same, but one that is assembled with an angle farther from its guess is not followed: its
+// status at the first time says that it is assembled.
+size_t problem_3_5_6_follow_variants(const problem_3_5_6_variants *all, double farthest);
+
+// Make a safeguarded attempt from the guess of each, at the first time. Written are where it ends, q,
+// and a status: PROBLEM_3_5_6_CONVERGED where a position may be so near that plain steps lead to it,
+// PROBLEM_3_5_6_NOT_CONVERGED where the variant cannot be assembled from there.
+void problem_3_5_6_attempt_variants(const problem_3_5_6_variants *all);
+
+// Write, q, about where variants can be assembled beyond the singular positions nearest to guesses
+// that are positions; what is not finite cannot be said. Equations are measured by what their terms
+// contribute, 3 numbers.
+void problem_3_5_6_mirror_variants(const problem_3_5_6_variants *all, const double *magnitude);
+
+// Lead positions at the first time from the parameters of the variants, the same for all, along
+// straight lines to others, 0 a variant. They stay on their branch. Written is what became of
+// each: PROBLEM_3_5_6_LOCK_UP where its branch ends on the way.
+void problem_3_5_6_lead_variants(const problem_3_5_6_variants *all, problem_3_5_6_input ends);
+
 #ifdef __cplusplus
 }
 #endif

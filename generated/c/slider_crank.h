@@ -143,6 +143,25 @@ typedef struct {
 // Follow the motions; returns how many variants converged at all times.
 size_t slider_crank_march_variants(const slider_crank_variants *all);
 
+// The same, but one that is assembled with an angle farther from its guess is not followed: its
+// status at the first time says that it is assembled.
+size_t slider_crank_follow_variants(const slider_crank_variants *all, double farthest);
+
+// Make a safeguarded attempt from the guess of each, at the first time. Written are where it ends, q,
+// and a status: SLIDER_CRANK_CONVERGED where a position may be so near that plain steps lead to it,
+// SLIDER_CRANK_NOT_CONVERGED where the variant cannot be assembled from there.
+void slider_crank_attempt_variants(const slider_crank_variants *all);
+
+// Write, q, about where variants can be assembled beyond the singular positions nearest to guesses
+// that are positions; what is not finite cannot be said. Equations are measured by what their terms
+// contribute, 9 numbers.
+void slider_crank_mirror_variants(const slider_crank_variants *all, const double *magnitude);
+
+// Lead positions at the first time from the parameters of the variants, the same for all, along
+// straight lines to others, 0 a variant. They stay on their branch. Written is what became of
+// each: SLIDER_CRANK_LOCK_UP where its branch ends on the way.
+void slider_crank_lead_variants(const slider_crank_variants *all, slider_crank_input ends);
+
 #ifdef __cplusplus
 }
 #endif

@@ -120,6 +120,13 @@ static const int outputs_q_place[] = {
     10, 11, 12, 13, 31, 32, 33, 34, 52, 53, 54, 55, 70, 73, 74, 75, 76, 77,
 };
 
+// A line of parameters that points may be on, at a time of the mechanism: the part of it that lies
+// behind is what they have as their time. Where a point is led along one, the line ends at its own.
+typedef struct {
+    int is_led;
+    double t, begin[K > 0 ? K : 1];
+} line;
+
 // A strip of points: the last axis is the point.
 typedef struct {
     double t[LANES];
@@ -134,6 +141,8 @@ typedef struct {
     double outputs_dot[4][LANES];
     double outputs_ddot[4][LANES];
     double outputs_q[21][LANES];
+    line on;
+    double ends[K > 0 ? K : 1][LANES];
 } strip;
 
 #ifdef __GNUC__
@@ -2185,9 +2194,13 @@ void spatial_slider_crank_solve(const spatial_slider_crank_system *system)
     }
 }
 
-// Which coordinates are angles; numbers of size 1/2 to 1 and either sign without a pattern.
+// Which coordinates are angles; which are or may be; numbers of size 1/2 to 1 and either sign without
+// a pattern.
 static const int ANGULAR[] = {
     0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 1, 1, 1, 1,
+};
+static const int MAY_TURN[] = {
+    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
 };
 static const double PROBE[] = {
     -0.8090169943749475, -0.6180339887498949, 0.9270509831248424, 0.7360679774997898,
@@ -2223,20 +2236,49 @@ static const double LEFT = 64.0, GROWN = 8.0, BEFORE_LOCK_UP = 0.0001;
 // Factor of the step after a good one, largest part of the way to where growing velocities end, and
 // largest factor by which a step becomes shorter.
 static const double GROWTH = 1.5, BEFORE = 0.75, SHORTER = 8.0;
+// Safeguarded steps: the longest of an angle, the weight of the gradient, the part of the decrease
+// that must come true, the shortest part of a step. What equations are missed by where an attempt may
+// lead to a position; to which part of itself that falls over three steps, and by which part of its
+// square it would fall if they were linear; an entry with whose square nothing can be solved.
+static const double LARGEST_ANGLE = 0.5, BEND = 0.01, SUFFICIENT = 0.0001;
+static const double SHORTEST_STEP = 9.5367431640625e-07, STEEP = 1000000.0, ASSEMBLES = 1e-06;
+static const double FALLING = 0.9, STATIONARY = 0.1, TOO_STEEP = 1e+100;
+// How far from a position is near, in angles and sizes of the mechanism; the step, as a part of that,
+// over which Phi_q is seen to change, and iterations that lead to its smallest singular value.
+static const double NEAR_ANGLE = 0.5235987755982988, NEAR_PART = 0.1, MIRROR_STEP = 1e-05;
+enum { INVERSE_ITERATIONS = 25 };
+// Parts of a line of parameters over which differences give first and second derivatives.
+static const double FIRST_DIFFERENCE = 1e-05, SECOND_DIFFERENCE = 0.0001;
+// Entries of a triangle of normal equations.
+enum { NORMAL = N * (N + 1) / 2 };
 // Newton iterations of a predicted point, sub-steps between two times.
 enum { MAX_CORRECTIONS = 6, MAX_SUBSTEPS = 10000 };
 
+#ifdef __GNUC__
+#define _never_inline static __attribute__((noinline))
+#else
+#define _never_inline static
+#endif
+
 // A good point of a motion: its numbers in the rows of a strip from t to determinants.
 enum { ROWS = offsetof(strip, F) / sizeof(double[LANES]) };
-typedef union {
-    double t, row[ROWS];
+typedef struct {
+    double t, rest[ROWS - 1];
+    line on;
+    double ends[K > 0 ? K : 1];
 } state;
 
 // Take up a lane of a strip as a good point.
 static void take_up(state *at, const strip *b, size_t k)
 {
     for (int i = 0; i < ROWS; i++)
-        at->row[i] = ((const double *)b)[i * LANES + (int)k];
+        (&at->t)[i] = ((const double *)b)[i * LANES + (int)k];
+    at->on.is_led = b->on.is_led;
+    if (b->on.is_led) {
+        at->on = b->on;
+        for (int i = 0; i < K; i++)
+            at->ends[i] = b->ends[i][k];
+    }
 }
 
 // Put lanes of a strip at a good point.
@@ -2244,13 +2286,25 @@ static void put_at(strip *b, const state *at, size_t first, size_t end)
 {
     for (int i = 0; i < ROWS; i++)
         for (size_t k = first; k < end; k++)
-            ((double *)b)[(size_t)i * LANES + k] = at->row[i];
+            ((double *)b)[(size_t)i * LANES + k] = (&at->t)[i];
+    b->on.is_led = at->on.is_led;
+    if (at->on.is_led) {
+        b->on = at->on;
+        for (int i = 0; i < K; i++)
+            for (size_t k = first; k < end; k++)
+                b->ends[i][k] = at->ends[i];
+    }
 }
 
 // Keep the points of a strip, without what was computed there.
 static void keep(strip *to, const strip *b)
 {
     memcpy(to, b, ROWS * sizeof b->t);
+    to->on.is_led = b->on.is_led;
+    if (b->on.is_led) {
+        to->on = b->on;
+        memcpy(to->ends, b->ends, sizeof b->ends);
+    }
 }
 
 // Put the entries of matrices that never change in place.
@@ -2258,14 +2312,116 @@ static void constants_of_strip(strip *b, size_t count)
 {
     double matrices[MATRICES];
     place_constants(b, matrices, count);
+    b->on.is_led = 0;
+}
+
+// Lead points along lines from their parameters, which all have, to those of a table.
+static void lead(strip *b, spatial_slider_crank_input ends, size_t first, size_t count)
+{
+    double check[LANES];
+    b->on.is_led = 1;
+    b->on.t = b->t[0];
+    for (int i = 0; i < K; i++)
+        b->on.begin[i] = b->p[i][0];
+    read_rows(b->ends, K, ends, first, count, check);
+    memset(b->t, 0, sizeof b->t);
+}
+
+// Put points where those of others are on their lines, and a part of these beside it.
+static void put_beside(strip *to, const strip *b, double part, size_t count)
+{
+    for (int i = 0; i < K; i++)
+        for (size_t k = 0; k < count; k++)
+            to->p[i][k] = b->on.begin[i] + (b->t[k] + part) * (b->ends[i][k] - b->on.begin[i]);
+    for (size_t k = 0; k < count; k++)
+        to->t[k] = b->on.t;
+}
+
+// The kernels of points that may be on lines.
+_never_inline void position_on_line(strip *b, size_t count)
+{
+    double part[LANES];
+    if (!b->on.is_led) {
+        position_of_strip(b, count);
+        return;
+    }
+    memcpy(part, b->t, count * sizeof *part);
+    put_beside(b, b, 0.0, count);
+    position_of_strip(b, count);
+    memcpy(b->t, part, count * sizeof *part);
+}
+
+_never_inline void nu_on_line(strip *b, size_t count)
+{
+    if (!b->on.is_led) {
+        nu_of_strip(b, count);
+        return;
+    }
+    strip beside;
+    memcpy(beside.q, b->q, sizeof b->q);
+    put_beside(&beside, b, -FIRST_DIFFERENCE, count);
+    position_of_strip(&beside, count);
+    memcpy(b->nu, beside.Phi, sizeof b->nu);
+    put_beside(&beside, b, FIRST_DIFFERENCE, count);
+    position_of_strip(&beside, count);
+    for (int i = 0; i < M; i++)
+        for (size_t k = 0; k < count; k++)
+            b->nu[i][k] = (b->nu[i][k] - beside.Phi[i][k]) / (2 * FIRST_DIFFERENCE);
+}
+
+_never_inline void gamma_on_line(strip *b, size_t count)
+{
+    if (!b->on.is_led) {
+        gamma_of_strip(b, count);
+        return;
+    }
+    strip beside;
+    for (int i = 0; i < M; i++)
+        for (size_t k = 0; k < count; k++)
+            b->gamma[i][k] = 2 * b->Phi[i][k];
+    for (int side = -1; side < 2; side += 2) {
+        const double part = side * SECOND_DIFFERENCE;
+        for (int i = 0; i < N; i++)
+            for (size_t k = 0; k < count; k++)
+                beside.q[i][k] = b->q[i][k] + part * b->q_dot[i][k];
+        put_beside(&beside, b, part, count);
+        position_of_strip(&beside, count);
+        for (int i = 0; i < M; i++)
+            for (size_t k = 0; k < count; k++)
+                b->gamma[i][k] -= beside.Phi[i][k];
+    }
+    for (int i = 0; i < M; i++)
+        for (size_t k = 0; k < count; k++)
+            b->gamma[i][k] /= SECOND_DIFFERENCE * SECOND_DIFFERENCE;
 }
 
 // What rates of points miss of their equations.
 static void missed_of_strip(const strip *b, const double (*weight)[LANES],
     double *restrict by_velocity, double *restrict by_acceleration, size_t count)
 {
-    for (size_t k = 0; k < count; k++)
-        missed_at(b, weight, &by_velocity[k], &by_acceleration[k], k);
+    if (!b->on.is_led) {
+        for (size_t k = 0; k < count; k++)
+            missed_at(b, weight, &by_velocity[k], &by_acceleration[k], k);
+        return;
+    }
+    // On a line right sides vary that otherwise never do.
+    for (size_t k = 0; k < count; k++) {
+        double first[M], second[M];
+        by_velocity[k] = by_acceleration[k] = 0;
+        for (int i = 0; i < M; i++) {
+            first[i] = b->nu[i][k];
+            second[i] = b->gamma[i][k];
+        }
+        for (int e = 0; e < NONZEROS; e++) {
+            const int *place = spatial_slider_crank_pattern[e];
+            first[place[0]] -= b->Phi_q[e][k] * b->q_dot[place[1]][k];
+            second[place[0]] -= b->Phi_q[e][k] * b->q_ddot[place[1]][k];
+        }
+        for (int i = 0; i < M; i++) {
+            by_velocity[k] += weight[i][k] * first[i] * first[i];
+            by_acceleration[k] += weight[i][k] * second[i] * second[i];
+        }
+    }
 }
 
 // Write rows where those of a time are wanted, which begin so much farther on.
@@ -2306,6 +2462,18 @@ typedef struct {
     double by_acceleration[LANES];
 } outcome;
 
+// Where safeguarded attempts are.
+typedef struct {
+    double weight[M][LANES];        // by what equations are multiplied to count alike
+    double entry[NONZEROS][LANES];  // Phi_q with these weights, in scales
+    double normal[NORMAL][LANES];   // of the normal equations the lower triangle, row by row
+    double step[N][LANES];          // correction, in scales
+    double residual[LANES];
+    double steepest[LANES];         // largest entry of Phi_q
+    double falls[LANES];            // part of its square by which a residual falls, if the equations are linear
+    int is_near[LANES];
+} descent;
+
 // Measure the equations of a mechanism around positions, which stay as they are.
 static void measure(strip *b, double size, scales *s, size_t lanes)
 {
@@ -2317,7 +2485,7 @@ static void measure(strip *b, double size, scales *s, size_t lanes)
             s->inverse[i][lane] = 1.0 / s->reference[i][lane];
             b->q[i][lane] += s->reference[i][lane] * PROBE[i];
         }
-    position_of_strip(b, lanes);
+    position_on_line(b, lanes);
     memset(s->magnitude, 0, sizeof s->magnitude);
     memset(s->noise, 0, sizeof s->noise);
     for (int e = 0; e < NONZEROS; e++) {
@@ -2353,7 +2521,7 @@ static void correct(strip *b, const scales *s, int most, outcome *o, size_t lane
         if (!any_lane(going, lanes))
             break;
         double is_large[LANES] = { 0 };
-        position_of_strip(b, lanes);
+        position_on_line(b, lanes);
         factor_of_strip(b, lanes);
         double change[N][LANES];
         solve_of_strip(b->F, b->Phi, change, lanes);
@@ -2386,7 +2554,7 @@ static void complete(strip *b, const scales *s, outcome *o, size_t lanes)
     double is_off[LANES] = { 0 };
     double speed[LANES] = { 0 };
     double gain[LANES] = { 0 };
-    position_of_strip(b, lanes);
+    position_on_line(b, lanes);
     factor_of_strip(b, lanes);
     for (size_t lane = 0; lane < lanes; lane++) {
         o->residual[lane] = 0.0;
@@ -2404,9 +2572,9 @@ static void complete(strip *b, const scales *s, outcome *o, size_t lanes)
     // A third right side, of the size of the equations' terms, shows how near to singular Phi_q is.
     double answer[N][LANES];
     solve_of_strip(b->F, right, answer, lanes);
-    nu_of_strip(b, lanes);
+    nu_on_line(b, lanes);
     solve_of_strip(b->F, b->nu, b->q_dot, lanes);
-    gamma_of_strip(b, lanes);
+    gamma_on_line(b, lanes);
     solve_of_strip(b->F, b->gamma, b->q_ddot, lanes);
     for (int i = 0; i < N; i++)
         for (size_t lane = 0; lane < lanes; lane++) {
@@ -2515,7 +2683,7 @@ static int locks_up(strip *b, const scales *s, double t, double smallest, double
     if (!(left <= LEFT * smallest && speed_of(b, s) >= GROWN * before))
         return 0;
     b->t[0] = t;
-    position_of_strip(b, 1);
+    position_on_line(b, 1);
     double total = 0.0;
     for (int i = 0; i < M; i++)
         total += b->Phi[i][0];
@@ -2611,9 +2779,9 @@ static void record(const spatial_slider_crank_variants *m, strip *b, const outco
     }
 }
 
-// Assemble variants from their guesses, at the first time.
-static void assemble(const spatial_slider_crank_variants *m, strip *b, scales *s, size_t first,
-    size_t count, outcome *o)
+// Put variants at their guesses, at the first time, and measure their equations.
+static void put_at_guesses(const spatial_slider_crank_variants *m, strip *b, scales *s,
+    size_t first, size_t count, outcome *o)
 {
     constants_of_strip(b, count);
     s->tolerance = m->tolerance;
@@ -2629,6 +2797,13 @@ static void assemble(const spatial_slider_crank_variants *m, strip *b, scales *s
         o->is_over[k] = 0;
     }
     measure(b, m->size, s, count);
+}
+
+// Assemble variants from their guesses, at the first time.
+static void assemble(const spatial_slider_crank_variants *m, strip *b, scales *s, size_t first,
+    size_t count, outcome *o)
+{
+    put_at_guesses(m, b, s, first, count, o);
     correct(b, s, m->max_iterations, o, count);
     complete(b, s, o, count);
     // The guess may be rough.
@@ -2687,8 +2862,10 @@ static void put_to_rest(const spatial_slider_crank_variants *m, strip *b, outcom
     size_t count)
 {
     for (size_t k = 0; k < count; k++) {
-        if (o->is_over[k])
+        if (o->is_over[k]) {
             o->status[k] = SPATIAL_SLIDER_CRANK_NOT_REACHED;
+            o->iterations[k] = 0;
+        }
         if (o->status[k] != SPATIAL_SLIDER_CRANK_CONVERGED) {
             o->is_over[k] = 1;
             for (int i = 0; i < N; i++) {
@@ -2701,8 +2878,9 @@ static void put_to_rest(const spatial_slider_crank_variants *m, strip *b, outcom
     }
 }
 
-// Follow the motions of variants; return how many converged at all times.
-size_t spatial_slider_crank_march_variants(const spatial_slider_crank_variants *m)
+// Follow the motions of variants; return how many converged at all times. One that is assembled
+// with an angle that is farther from its guess is not followed.
+size_t spatial_slider_crank_follow_variants(const spatial_slider_crank_variants *m, double farthest)
 {
     strip b;
     strip before;
@@ -2715,17 +2893,30 @@ size_t spatial_slider_crank_march_variants(const spatial_slider_crank_variants *
         assemble(m, &b, &s, first, count, &o);
         put_to_rest(m, &b, &o, first, count);
         record(m, &b, &o, 0, first, count);
+        for (size_t k = 0; k < count; k++)
+            for (int i = 0; i < N; i++)
+                if (MAY_TURN[i]
+                        && fabs(b.q[i][k]
+                            - m->guess.first[i * m->guess.entry
+                                + (ptrdiff_t)(first + k) * m->guess.point]) > farthest)
+                    o.status[k] = SPATIAL_SLIDER_CRANK_NOT_REACHED;
+        put_to_rest(m, &b, &o, first, count);
         for (size_t time = 1; time < m->count; time++) {
-            keep(&before, &b);
-            double t[LANES];
-            for (size_t lane = 0; lane < LANES; lane++)
-                t[lane] = m->t[time];
-            step(&b, &s, t, &o, count);
+            int is_going = 0;
             for (size_t k = 0; k < count; k++)
-                if (o.status[k] != SPATIAL_SLIDER_CRANK_CONVERGED && !o.is_over[k]) {
-                    take_up(&at, &before, k);
-                    advance(&b, &s, &at, m->t[time], k, &o);
-                }
+                is_going = is_going || !o.is_over[k];
+            if (is_going) {
+                keep(&before, &b);
+                double t[LANES];
+                for (size_t lane = 0; lane < LANES; lane++)
+                    t[lane] = m->t[time];
+                step(&b, &s, t, &o, count);
+                for (size_t k = 0; k < count; k++)
+                    if (o.status[k] != SPATIAL_SLIDER_CRANK_CONVERGED && !o.is_over[k]) {
+                        take_up(&at, &before, k);
+                        advance(&b, &s, &at, m->t[time], k, &o);
+                    }
+            }
             put_to_rest(m, &b, &o, first, count);
             record(m, &b, &o, time, first, count);
         }
@@ -2734,6 +2925,335 @@ size_t spatial_slider_crank_march_variants(const spatial_slider_crank_variants *
                 good++;
     }
     return good;
+}
+
+// Follow the motions of variants; return how many converged at all times.
+size_t spatial_slider_crank_march_variants(const spatial_slider_crank_variants *m)
+{
+    return spatial_slider_crank_follow_variants(m, INFINITY);
+}
+
+// Find by what equations are multiplied to count alike, and by how much they are missed.
+_never_inline void weigh(strip *b, const scales *s, descent *d, size_t lanes)
+{
+    double total[LANES] = { 0 };
+    memset(d->weight, 0, sizeof d->weight);
+    for (size_t lane = 0; lane < lanes; lane++)
+        d->steepest[lane] = 0.0;
+    for (int e = 0; e < NONZEROS; e++) {
+        const int i = spatial_slider_crank_pattern[e][0];
+        for (size_t lane = 0; lane < lanes; lane++) {
+            const double slope = fabs(b->Phi_q[e][lane]);
+            d->weight[i][lane] += slope * s->reference[spatial_slider_crank_pattern[e][1]][lane];
+            d->steepest[lane] = slope > d->steepest[lane] ? slope : d->steepest[lane];
+        }
+    }
+    for (int i = 0; i < M; i++)
+        for (size_t lane = 0; lane < lanes; lane++) {
+            const double most = STEEP / ROUNDING * s->noise[i][lane];
+            double terms = most > 0.0 && d->weight[i][lane] > most ? most : d->weight[i][lane];
+            terms = s->magnitude[i][lane] > terms ? s->magnitude[i][lane] : terms;
+            d->weight[i][lane] = terms > 0.0 ? 1.0 / terms : 1.0;
+            total[lane] += d->weight[i][lane] * b->Phi[i][lane] * d->weight[i][lane] * b->Phi[i][lane];
+        }
+    for (size_t lane = 0; lane < lanes; lane++)
+        d->residual[lane] = sqrt(total[lane]);
+}
+
+// Fill the matrix of the normal equations, for scales of the coordinates, and factor it. Its
+// diagonal is larger by what bends the step.
+_never_inline void eliminate(strip *b, const double *scale, const double *bend, descent *d,
+    size_t lanes)
+{
+    int first = 0;
+    memset(d->normal, 0, sizeof d->normal);
+    for (int e = 0; e < NONZEROS; e++) {
+        const int i = spatial_slider_crank_pattern[e][0];
+        const int j = spatial_slider_crank_pattern[e][1];
+        for (size_t lane = 0; lane < lanes; lane++)
+            d->entry[e][lane] = d->weight[i][lane] * b->Phi_q[e][lane] * scale[j];
+        if (spatial_slider_crank_pattern[first][0] != i)
+            first = e;
+        for (int f = first; f < e + 1; f++)
+            for (size_t lane = 0; lane < lanes; lane++)
+                d->normal[j * (j + 1) / 2
+                        + spatial_slider_crank_pattern[f][1]][lane] += d->entry[e][lane] * d->entry[f][lane];
+    }
+    for (int k = 0; k < N; k++)
+        for (size_t lane = 0; lane < lanes; lane++)
+            d->normal[k * (k + 1) / 2 + k][lane] += bend[lane];
+    for (int k = 0; k < N; k++) {
+        double inverse[LANES];
+        for (size_t lane = 0; lane < lanes; lane++)
+            inverse[lane] = 1.0 / d->normal[k * (k + 1) / 2 + k][lane];
+        for (int i = k + 1; i < N; i++) {
+            double factor[LANES];
+            for (size_t lane = 0; lane < lanes; lane++)
+                factor[lane] = d->normal[i * (i + 1) / 2 + k][lane] * inverse[lane];
+            for (int j = k + 1; j < i + 1; j++)
+                for (size_t lane = 0; lane < lanes; lane++)
+                    d->normal[i * (i + 1) / 2
+                            + j][lane] -= factor[lane] * d->normal[j * (j + 1) / 2 + k][lane];
+        }
+    }
+}
+
+// Solve the normal equations, which are factored, for a right side in place of the step.
+_never_inline void substitute(descent *d, size_t lanes)
+{
+    for (size_t lane = 0; lane < lanes; lane++)
+        d->falls[lane] = 0.0;
+    for (int k = 0; k < N; k++) {
+        double part[LANES];
+        for (size_t lane = 0; lane < lanes; lane++) {
+            part[lane] = d->step[k][lane] / d->normal[k * (k + 1) / 2 + k][lane];
+            d->falls[lane] += d->step[k][lane] * part[lane];
+        }
+        for (int i = k + 1; i < N; i++)
+            for (size_t lane = 0; lane < lanes; lane++)
+                d->step[i][lane] -= d->normal[i * (i + 1) / 2 + k][lane] * part[lane];
+    }
+    for (int n = 0; n < N; n++) {
+        const int k = N - 1 - n;
+        for (int i = k + 1; i < N; i++)
+            for (size_t lane = 0; lane < lanes; lane++)
+                d->step[k][lane] -= d->normal[i * (i + 1) / 2 + k][lane] * d->step[i][lane];
+        for (size_t lane = 0; lane < lanes; lane++)
+            d->step[k][lane] = d->step[k][lane] / d->normal[k * (k + 1) / 2 + k][lane];
+    }
+}
+
+// Find Levenberg's and Marquardt's correction from the normal equations.
+_never_inline void direct(strip *b, const double *scale, descent *d, size_t lanes)
+{
+    double bend[LANES];
+    for (size_t lane = 0; lane < lanes; lane++)
+        bend[lane] = BEND * (d->residual[lane] < 1.0 ? d->residual[lane] : 1.0);
+    eliminate(b, scale, bend, d, lanes);
+    memset(d->step, 0, sizeof d->step);
+    for (int e = 0; e < NONZEROS; e++) {
+        const int i = spatial_slider_crank_pattern[e][0];
+        for (size_t lane = 0; lane < lanes; lane++)
+            d->step[spatial_slider_crank_pattern[e][1]][lane] -= d->entry[e][lane] * d->weight[i][lane] * b->Phi[i][lane];
+    }
+    substitute(d, lanes);
+    for (size_t lane = 0; lane < lanes; lane++)
+        d->falls[lane] = d->falls[lane] / (d->residual[lane] * d->residual[lane]);
+}
+
+// Take safeguarded steps, as `start` does, and note which come near to a position. An attempt is
+// in vain that could not lower its residual if the equations were linear, or has not lowered it
+// over three steps: it is at a minimum, or oscillates around one.
+_never_inline void descend(strip *b, const scales *s, const double *scale, int most, descent *d,
+    size_t lanes)
+{
+    double is_near[LANES] = { 0 };
+    double going[LANES];
+    double third[LANES];
+    double second[LANES];
+    double last[LANES];
+    for (size_t lane = 0; lane < lanes; lane++) {
+        going[lane] = 1;
+        third[lane] = INFINITY;
+        second[lane] = INFINITY;
+        last[lane] = INFINITY;
+    }
+    position_on_line(b, lanes);
+    for (int iteration = 0; iteration < most; iteration++) {
+        weigh(b, s, d, lanes);
+        for (size_t lane = 0; lane < lanes; lane++) {
+            const int is_close = !(d->residual[lane] > ASSEMBLES)
+                || !(d->steepest[lane] < TOO_STEEP);
+            is_near[lane] = (going[lane] != 0 && is_close) ? 1 : is_near[lane];
+            going[lane] = going[lane] != 0 && !is_close
+                && d->residual[lane] < FALLING * third[lane];
+            third[lane] = second[lane];
+            second[lane] = last[lane];
+            last[lane] = going[lane] != 0 ? d->residual[lane] : last[lane];
+        }
+        if (!any_lane(going, lanes))
+            break;
+        direct(b, scale, d, lanes);
+        for (size_t lane = 0; lane < lanes; lane++) {
+            const int is_wild = !isfinite(d->falls[lane]);
+            is_near[lane] = (going[lane] != 0 && is_wild) ? 1 : is_near[lane];
+            going[lane] = going[lane] != 0 && !is_wild && d->falls[lane] > STATIONARY;
+        }
+        double begin[N][LANES];
+        memcpy(begin, b->q, sizeof begin);
+        double excess[LANES];
+        for (size_t lane = 0; lane < lanes; lane++)
+            excess[lane] = 1.0;
+        for (int i = 0; i < N; i++)
+            for (size_t lane = 0; lane < lanes; lane++) {
+                const double size = fabs(d->step[i][lane]) / (ANGULAR[i] ? LARGEST_ANGLE : 1.0);
+                excess[lane] = size > excess[lane] ? size : excess[lane];
+            }
+        double part[LANES];
+        double trying[LANES];
+        for (size_t lane = 0; lane < lanes; lane++) {
+            part[lane] = 1.0 / excess[lane];
+            trying[lane] = going[lane] != 0;
+        }
+        while (any_lane(trying, lanes)) {
+            for (int i = 0; i < N; i++)
+                for (size_t lane = 0; lane < lanes; lane++) {
+                    const double moved = begin[i][lane]
+                        + part[lane] * scale[i] * d->step[i][lane];
+                    b->q[i][lane] = trying[lane] != 0 ? moved : b->q[i][lane];
+                }
+            position_on_line(b, lanes);
+            double total[LANES] = { 0 };
+            for (int i = 0; i < M; i++)
+                for (size_t lane = 0; lane < lanes; lane++)
+                    total[lane] += d->weight[i][lane] * b->Phi[i][lane] * d->weight[i][lane] * b->Phi[i][lane];
+            double is_over[LANES];
+            for (size_t lane = 0; lane < lanes; lane++) {
+                const int is_lower = sqrt(total[lane]) <= (1.0
+                        - SUFFICIENT * part[lane]) * d->residual[lane];
+                trying[lane] = is_lower ? 0 : trying[lane];
+                part[lane] = trying[lane] != 0 ? 0.5 * part[lane] : part[lane];
+                is_over[lane] = trying[lane] != 0 && part[lane] < SHORTEST_STEP;
+                going[lane] = is_over[lane] != 0 ? 0 : going[lane];
+                trying[lane] = is_over[lane] != 0 ? 0 : trying[lane];
+            }
+            for (int i = 0; i < N; i++)
+                for (size_t lane = 0; lane < lanes; lane++)
+                    b->q[i][lane] = is_over[lane] != 0 ? begin[i][lane] : b->q[i][lane];
+        }
+    }
+    for (size_t lane = 0; lane < lanes; lane++)
+        d->is_near[lane] = is_near[lane] != 0;
+}
+
+// Make a safeguarded attempt from the guess of each variant, at the first time. Where it ends is
+// written, and a status: CONVERGED where a position may be near, from which plain steps lead to it
+// or nowhere, and NOT_CONVERGED where none is.
+void spatial_slider_crank_attempt_variants(const spatial_slider_crank_variants *m)
+{
+    strip b;
+    scales s;
+    outcome o;
+    descent d;
+    double scale[N];
+    for (int i = 0; i < N; i++)
+        scale[i] = ANGULAR[i] ? 1.0 : m->size;
+    for (size_t first = 0; first < m->variants; first += LANES) {
+        const size_t count = m->variants - first < LANES ? m->variants - first : LANES;
+        put_at_guesses(m, &b, &s, first, count, &o);
+        descend(&b, &s, scale, m->max_iterations, &d, count);
+        store(m->q, (ptrdiff_t)0 * m->time, b.q, first, count);
+        for (size_t k = 0; k < count; k++)
+            m->status[first + k] = d.is_near[k] ? SPATIAL_SLIDER_CRANK_CONVERGED
+                : SPATIAL_SLIDER_CRANK_NOT_CONVERGED;
+    }
+}
+
+// Go to about where mechanisms can be assembled beyond their nearest singular position. As
+// `other_side` does. The movement to it is that of the smallest singular value: the inverse
+// iteration of the normal equations leads to it.
+_never_inline void mirror(strip *b, const double *magnitude, const double *scale, descent *d,
+    size_t lanes)
+{
+    double image[M][LANES];
+    double none[LANES] = { 0 };
+    double least[LANES] = { 0 };
+    double bend[LANES] = { 0 };
+    position_on_line(b, lanes);
+    for (int i = 0; i < M; i++)
+        for (size_t lane = 0; lane < lanes; lane++) {
+            d->weight[i][lane] = magnitude[i] > 0.0 ? 1.0 / magnitude[i] : 1.0;
+            image[i][lane] = 0.0;
+        }
+    eliminate(b, scale, none, d, lanes);
+    for (int i = 0; i < N; i++)
+        for (size_t lane = 0; lane < lanes; lane++)
+            d->step[i][lane] = PROBE[i];
+    for (int iteration = 0; iteration < INVERSE_ITERATIONS; iteration++) {
+        substitute(d, lanes);
+        double square[LANES] = { 0 };
+        for (int i = 0; i < N; i++)
+            for (size_t lane = 0; lane < lanes; lane++)
+                square[lane] += d->step[i][lane] * d->step[i][lane];
+        double size[LANES];
+        for (size_t lane = 0; lane < lanes; lane++)
+            size[lane] = sqrt(square[lane]);
+        for (int i = 0; i < N; i++)
+            for (size_t lane = 0; lane < lanes; lane++)
+                d->step[i][lane] = d->step[i][lane] / size[lane];
+    }
+    for (int e = 0; e < NONZEROS; e++)
+        for (size_t lane = 0; lane < lanes; lane++)
+            image[spatial_slider_crank_pattern[e][0]][lane] += d->entry[e][lane] * d->step[spatial_slider_crank_pattern[e][1]][lane];
+    for (int i = 0; i < M; i++)
+        for (size_t lane = 0; lane < lanes; lane++)
+            least[lane] += image[i][lane] * image[i][lane];
+    for (int i = 0; i < N; i++)
+        for (size_t lane = 0; lane < lanes; lane++)
+            b->q[i][lane] += MIRROR_STEP * scale[i] * d->step[i][lane];
+    position_on_line(b, lanes);
+    for (int e = 0; e < NONZEROS; e++) {
+        const int i = spatial_slider_crank_pattern[e][0];
+        const int j = spatial_slider_crank_pattern[e][1];
+        for (size_t lane = 0; lane < lanes; lane++) {
+            const double moved = d->weight[i][lane] * b->Phi_q[e][lane] * scale[j];
+            bend[lane] += image[i][lane] * (moved - d->entry[e][lane]) * d->step[j][lane];
+        }
+    }
+    for (int i = 0; i < N; i++)
+        for (size_t lane = 0; lane < lanes; lane++)
+            b->q[i][lane] -= (MIRROR_STEP
+                    + 2.0 * least[lane] * MIRROR_STEP / bend[lane]) * scale[i] * d->step[i][lane];
+}
+
+// Write about where variants can be assembled beyond the singular positions nearest to these.
+// Equations are measured by what their terms contribute. Numbers that are not finite say nothing.
+void spatial_slider_crank_mirror_variants(const spatial_slider_crank_variants *m,
+    const double *magnitude)
+{
+    strip b;
+    scales s;
+    outcome o;
+    descent d;
+    double scale[N];
+    for (int i = 0; i < N; i++)
+        scale[i] = ANGULAR[i] ? NEAR_ANGLE : NEAR_PART * m->size;
+    for (size_t first = 0; first < m->variants; first += LANES) {
+        const size_t count = m->variants - first < LANES ? m->variants - first : LANES;
+        put_at_guesses(m, &b, &s, first, count, &o);
+        mirror(&b, magnitude, scale, &d, count);
+        store(m->q, (ptrdiff_t)0 * m->time, b.q, first, count);
+    }
+}
+
+// Lead variants from their parameters to others, on a straight line, at the first time. The
+// mechanism moves along the line as under a driver, and stays on its branch: the part of the line
+// that lies behind takes the place of time. Written is what became of each at its end.
+void spatial_slider_crank_lead_variants(const spatial_slider_crank_variants *m,
+    spatial_slider_crank_input ends)
+{
+    strip b;
+    strip before;
+    scales s;
+    outcome o;
+    state at;
+    for (size_t first = 0; first < m->variants; first += LANES) {
+        const size_t count = m->variants - first < LANES ? m->variants - first : LANES;
+        assemble(m, &b, &s, first, count, &o);
+        lead(&b, ends, first, count);
+        complete(&b, &s, &o, count);
+        keep(&before, &b);
+        double end[LANES];
+        for (size_t lane = 0; lane < LANES; lane++)
+            end[lane] = 1.0;
+        step(&b, &s, end, &o, count);
+        for (size_t k = 0; k < count; k++)
+            if (o.status[k] != SPATIAL_SLIDER_CRANK_CONVERGED) {
+                take_up(&at, &before, k);
+                advance(&b, &s, &at, 1.0, k, &o);
+            }
+        record(m, &b, &o, 0, first, count);
+    }
 }
 
 size_t spatial_slider_crank_march(const spatial_slider_crank_motion *motion)
@@ -2751,25 +3271,19 @@ size_t spatial_slider_crank_march(const spatial_slider_crank_motion *motion)
 // The start: who brings one's own leaves it out of the library.
 #ifndef _WITHOUT_START
 
-// Which coordinates are angles or may be, and of each the first of its body's Euler parameters; N
-// of all others.
-static const int MAY_TURN[] = {
-    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
-};
+// Of each coordinate the first of its body's Euler parameters; N of all others.
 static const int COVER[] = {
     21, 21, 21, 3, 3, 3, 3, 21, 21, 21, 10, 10, 10, 10, 21, 21, 21, 17, 17, 17, 17,
 };
-// By what a start judges: how far from a guess is near, settled, astray, thrown; how near another
+// By what a start judges: how far from a guess is settled, astray, thrown; how near another
 // assembly is named as, and looked at beyond a singular position; when two positions are the same.
-static const double NEAR_ANGLE = 0.5235987755982988, NEAR_PART = 0.1, SETTLED = 0.5;
+static const double SETTLED = 0.5;
 static const double ASTRAY = 5.0, THROWN = 10.0, FAR = 0.7853981633974483, AS_NEAR = 1.1;
-static const double MIRRORED = 2.0, MIRROR_STEP = 1e-05, FOLDED = 1e-09;
-static const double SAME_POSITION = 1e-06, WILD = 1000.0, STEEP = 1000000.0;
+static const double MIRRORED = 2.0, FOLDED = 1e-09;
+static const double SAME_POSITION = 1e-06, WILD = 1000.0;
 static const double LONGEST_P = 2.0, TURN = 6.283185307179586;
-// Safeguarded steps: the longest of an angle, the weight of the gradient, the part of the decrease
-// that must come true, the shortest part of a step, how far restarts are.
-static const double LARGEST_ANGLE = 0.5, BEND = 0.01, SUFFICIENT = 0.0001;
-static const double SHORTEST_STEP = 9.5367431640625e-07, NUDGE = 0.3;
+// How far restarts are from a guess.
+static const double NUDGE = 0.3;
 static const int RESTARTS = 4, MOST_MIRRORED = 300;
 // Rows and columns of a matrix of least squares.
 enum { TALL = M + N, WIDE = N + 1 };
@@ -2842,7 +3356,7 @@ static int place_at(const double *q, double t, strip *b)
     b->t[0] = t;
     for (int i = 0; i < N; i++)
         b->q[i][0] = q[i];
-    position_of_strip(b, 1);
+    position_on_line(b, 1);
     for (int i = 0; i < M; i++)
         total += b->Phi[i][0];
     return isfinite(total);

@@ -953,8 +953,8 @@ def _record(m, b, o, time, first, count):
             m.q_ddot[time * m.variants + first][i] = math.nan
 
 
-def _assemble(m, b, s, first, count, o):
-    """Assemble variants from their guesses, at the first time."""
+def _put_at_guesses(m, b, s, first, count, o):
+    """Put variants at their guesses, at the first time, and measure their equations."""
     _constants_at(b)
     s.tolerance = m.tolerance
     for i in range(len(PARAMETERS)):
@@ -964,6 +964,11 @@ def _assemble(m, b, s, first, count, o):
     b.t = m.t[0]
     o.is_over = False
     _measure(b, m.size, s)
+
+
+def _assemble(m, b, s, first, count, o):
+    """Assemble variants from their guesses, at the first time."""
+    _put_at_guesses(m, b, s, first, count, o)
     _correct(b, s, m.max_iterations, o)
     _complete(b, s, o)
     # The guess may be rough.

@@ -1704,8 +1704,8 @@ fn record(m: &mut Variants, b: &Point, o: &Outcome, time: usize, first: usize, c
     }
 }
 
-/// Assemble variants from their guesses, at the first time.
-fn assemble(m: &Variants, b: &mut Point, s: &mut Scales, first: usize, count: usize, o: &mut
+/// Put variants at their guesses, at the first time, and measure their equations.
+fn put_at_guesses(m: &Variants, b: &mut Point, s: &mut Scales, first: usize, count: usize, o: &mut
     Outcome) {
     s.tolerance = m.tolerance;
     for i in 0..N_PARAMETERS {
@@ -1717,6 +1717,12 @@ fn assemble(m: &Variants, b: &mut Point, s: &mut Scales, first: usize, count: us
     b.t = m.t[0];
     o.is_over = false;
     measure(b, m.size, s);
+}
+
+/// Assemble variants from their guesses, at the first time.
+fn assemble(m: &Variants, b: &mut Point, s: &mut Scales, first: usize, count: usize, o: &mut
+    Outcome) {
+    put_at_guesses(m, b, s, first, count, o);
     correct(b, s, m.max_iterations, o);
     complete(b, s, o);
     // The guess may be rough.
@@ -1776,6 +1782,7 @@ pub fn march(m: &mut Variants) -> usize {
 fn put_to_rest(m: &Variants, b: &mut Point, o: &mut Outcome, first: usize, count: usize) {
     if o.is_over {
         o.status = NOT_REACHED;
+        o.iterations = 0;
     }
     if o.status != CONVERGED {
         o.is_over = true;
@@ -1787,8 +1794,9 @@ fn put_to_rest(m: &Variants, b: &mut Point, o: &mut Outcome, first: usize, count
     }
 }
 
-/// Follow the motions of variants; return how many converged at all times.
-pub fn march_variants(m: &mut Variants) -> usize {
+/// Follow the motions of variants; return how many converged at all times. One that is assembled
+/// with an angle that is farther from its guess is not followed.
+fn follow_variants(m: &mut Variants, farthest: f64) -> usize {
     let mut b = Point::new();
     let mut before = Point::new();
     let mut s = Scales::new();
@@ -1800,13 +1808,23 @@ pub fn march_variants(m: &mut Variants) -> usize {
         assemble(m, &mut b, &mut s, first, count, &mut o);
         put_to_rest(m, &mut b, &mut o, first, count);
         record(m, &b, &o, 0, first, count);
+        for i in 0..N_COORDINATES {
+            if MAY_TURN[i] && (b.q[i] - m.guess[first * N_COORDINATES + i]).abs() > farthest {
+                o.status = NOT_REACHED;
+            }
+        }
+        put_to_rest(m, &mut b, &mut o, first, count);
         for time in 1..m.count {
-            before.clone_from(&b);
-            let mut t = m.t[time];
-            step(&mut b, &s, t, &mut o);
-            if o.status != CONVERGED && !o.is_over {
-                take_up(&mut at, &before);
-                advance(&mut b, &s, &mut at, m.t[time], 0, &mut o);
+            let mut is_going = false;
+            is_going = is_going || !o.is_over;
+            if is_going {
+                before.clone_from(&b);
+                let mut t = m.t[time];
+                step(&mut b, &s, t, &mut o);
+                if o.status != CONVERGED && !o.is_over {
+                    take_up(&mut at, &before);
+                    advance(&mut b, &s, &mut at, m.t[time], 0, &mut o);
+                }
             }
             put_to_rest(m, &mut b, &mut o, first, count);
             record(m, &b, &o, time, first, count);
@@ -1816,6 +1834,11 @@ pub fn march_variants(m: &mut Variants) -> usize {
         }
     }
     return good;
+}
+
+/// Follow the motions of variants; return how many converged at all times.
+pub fn march_variants(m: &mut Variants) -> usize {
+    return follow_variants(m, INFINITE);
 }
 
 

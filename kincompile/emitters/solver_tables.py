@@ -5,7 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from kincompile import criteria, quantities
-from kincompile.solver.vocabulary import COUNTS, CRITERIA, START_COUNTS, START_CRITERIA
+from kincompile.solver.vocabulary import (
+    COUNTS,
+    CRITERIA,
+    LINE_CRITERIA,
+    SETS_COUNTS,
+    SETS_CRITERIA,
+    START_COUNTS,
+    START_CRITERIA,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -16,6 +24,10 @@ NUMBERS: Mapping[str, float] = {
     name: getattr(criteria, name) for name in (*CRITERIA, *START_CRITERIA, *COUNTS, *START_COUNTS)
 }
 """The criteria of march and start by name; the counts are whole numbers."""
+OF_SETS: Mapping[str, float] = {
+    name: getattr(criteria, name) for name in (*SETS_CRITERIA, *LINE_CRITERIA, *SETS_COUNTS)
+}
+"""Those of many parameter sets besides."""
 
 
 def solver_tables(program: Program) -> dict[str, Sequence[float]]:

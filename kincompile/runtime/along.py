@@ -90,9 +90,21 @@ def lead_together(
     Returns positions (n, B), which of them are those of their set, and which lines end at a
     bifurcation: the mechanism goes on there, but nothing says on which branch.
     """
-    code = along(inputs.code, inputs.p, float(inputs.t[0]))
-    q, count = np.repeat(begin[:, np.newaxis], len(sets), axis=1), len(sets)
+    time, count = float(inputs.t[0]), len(sets)
+    code = along(inputs.code, inputs.p, time)
+    q = np.repeat(begin[:, np.newaxis], count, axis=1)
     reached, crosses = np.zeros((2, count), dtype=bool)
+    everyone = np.arange(count)
+    if (
+        inputs.code.lead is not None
+    ):  # what it has no word for, a bifurcation, is left to steps here
+        given = inputs.p, time, begin, sets, equations.size, inputs.tolerance
+        found, known = inputs.code.lead(*given, inputs.max_iterations)
+        reached = known == Status.CONVERGED
+        q[:, reached] = found[:, reached]
+        everyone = np.flatnonzero(~reached & (known != Status.LOCK_UP))
+        if not everyone.size:
+            return q, reached, crosses
 
     def march_of(some: NDArray[np.intp]) -> March:
         engine = Planned(code, np.ascontiguousarray(sets[some].T))
@@ -102,9 +114,9 @@ def lead_together(
         own = lanes.motions[good]
         q[:, own], reached[own] = state.point.q[:, good], True
 
-    everyone, march = np.arange(count), march_of(np.arange(count))
-    state, _ = march.complete(march.engine.evaluate(q, np.zeros(count)))
-    lanes = Lanes(everyone, np.ones(count, dtype=np.intp), state)
+    march, some = march_of(everyone), q[:, everyone]
+    state, _ = march.complete(march.engine.evaluate(some, np.zeros(everyone.size)))
+    lanes = Lanes(everyone, np.ones(everyone.size, dtype=np.intp), state)
     ends, status = take_on(lanes, np.array([0.0, 1.0]), march_of, record)
     crosses[ends.motions] = status == Status.SINGULAR
     return q, reached, crosses

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import FOLDED, LARGE_ERROR, MAX_CORRECTIONS, SETTLED, TOO_NEAR
+from kincompile.criteria import (
+    FOLDED,
+    LARGE_ERROR,
+    MAX_CORRECTIONS,
+    SAME_POSITION,
+    SETTLED,
+    TOO_NEAR,
+)
 from kincompile.runtime.along import lead, lead_together
 from kincompile.runtime.attempts import other_sides, safeguarded
 from kincompile.runtime.engine.linear import Planned
@@ -237,8 +244,10 @@ class Sets:
         if self._may_show_branch:
             is_new = plain | untried | (guesses != self.place).any(axis=0)
             own = np.where(is_new, guesses, np.nan)
-            for begin in (own, near):
-                attempt(other_sides(equations, sets, time, attempt(begin)))
+            first, last = attempt(own), attempt(near)
+            last[:, equations.extent(last - first) <= SAME_POSITION] = np.nan
+            for reached in (first, last):
+                attempt(other_sides(equations, sets, time, reached))
         return found, least < np.inf, is_assembled, ~ends
 
     def _corrected(

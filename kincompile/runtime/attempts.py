@@ -8,17 +8,21 @@ them side by side; one that comes anywhere near to holding its equations is left
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile.criteria import (
+    ASSEMBLES,
     BEND,
+    FALLING,
     LARGEST_ANGLE,
     MOST_MIRRORED,
-    NEAR_MISS,
     SHORTEST_STEP,
+    STATIONARY,
     SUFFICIENT,
+    TOO_STEEP,
     probe_of,
 )
 from kincompile.runtime.engine.linear import Planned, stacked
@@ -28,11 +32,12 @@ from kincompile.runtime.start import mirrored, restart_points
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from kincompile.runtime.engine.code import Array, Compiled
+    from kincompile.runtime.engine.code import Array
     from kincompile.runtime.problem import Problem
 
     Mask = NDArray[np.bool_]
     Places = NDArray[np.intp]
+    Entries = tuple[tuple[int, int, float | None], ...]
 
 
 def safeguarded(
@@ -44,7 +49,7 @@ def safeguarded(
     lead from there to the position, or nowhere. The scales of all are those of one set. The module
     has a planned solve.
     """
-    pattern, times = _pattern_of(equations.code), np.broadcast_to(t, len(sets))
+    times = np.broadcast_to(t, len(sets))
     found, (first, *others) = np.full_like(guesses.T, np.nan), restart_points(equations, guesses)
     most = max(1, MOST_NUMBERS // equations.place.size**2)
     for some in ([first], others):
@@ -52,39 +57,49 @@ def safeguarded(
         own = np.tile(left, len(some))
         q = np.concatenate([begin[left] for begin in some]).T
         for part in [slice(k, k + most) for k in range(0, own.size, most)]:
-            here, sets_here = q[:, part].copy(), sets[own[part]].T.copy()
-            attempts = _Attempts(equations, pattern, sets_here, times[own[part]], here)
-            here[:, attempts.miss(here, max_iterations)] = np.nan
-            q[:, part] = here
+            here, which = q[:, part].copy(), own[part]
+            is_near = attempted(equations, sets[which], times[which], here, max_iterations)
+            q[:, part] = np.where(is_near, here, np.nan)
         for reached in reversed(np.split(q, len(some), axis=1)):  # the first one counts
             near = np.isfinite(reached[0])
             found[:, left[near]] = reached[:, near]
     return found
 
 
+def attempted(equations: Problem, sets: Array, t: Array, q: Array, max_iterations: int) -> Mask:
+    """Make attempts from positions (n, N), and say which come near; these become where they end."""
+    run = equations.code.attempts
+    if run is None or len(q) > LARGEST_DENSE:
+        return ~_Attempts(equations, sets.T.copy(), t, q).miss(q, max_iterations)
+    is_near = np.zeros(len(t), dtype=bool)
+    for time in np.unique(t):
+        which = np.flatnonzero(t == time)
+        own = q[:, which]
+        is_near[which] = run(sets[which], float(time), own, equations.size, max_iterations)
+        q[:, which] = own
+    return is_near
+
+
 def other_sides(equations: Problem, sets: Array, t: float, q: Array) -> Array:
     """Return `start.other_side` of N positions (n, N), with parameters (N, k)."""
-    n, pattern = len(q), _pattern_of(equations.code)
-    found = np.full_like(q, np.nan)
+    n, found, run = len(q), np.full_like(q, np.nan), equations.code.mirror
     some, most = np.flatnonzero(np.isfinite(q).all(axis=0)), max(1, MOST_NUMBERS // n**2)
     for first in range(0, some.size if n <= MOST_MIRRORED else 0, most):
         own = some[first : first + most]
         here, p = q[:, own], sets[own]
-        attempts = _Attempts(equations, pattern, p.T.copy(), np.full(len(p), t), here)
+        if run is not None and n <= LARGEST_DENSE:
+            found[:, own] = run(p, t, here, equations.size, equations.magnitude)
+            continue
+        attempts = _Attempts(equations, p.T.copy(), np.full(len(p), t), here)
         found[:, own] = mirrored(equations, here.T, attempts.matrices(here.T), attempts.matrices).T
     return found
 
 
-PATIENT, FALLING = 3, 0.9
-"""Over `PATIENT` steps a residual must fall to this part of itself. Otherwise the iteration
-oscillates around a minimum."""
+PATIENT = 3
+"""Steps over which a residual must fall."""
 
-STATIONARY = 0.1
-"""Part of itself by which the square of a residual falls at least, if equations are linear: less
-only at a minimum, far from holding them. Where they can hold it is nearly all."""
-
-WILD = 1e100
-"""Entry of Phi_q with whose square nothing can be solved."""
+LARGEST_DENSE = 60
+"""Coordinates up to which compiled attempts are made, whose normal equations are dense."""
 
 MOST_NUMBERS = 250_000
 """Numbers of the matrices that are taken at a time."""
@@ -108,21 +123,21 @@ class _Pattern:
     count: int  # of all entries
 
 
-def _pattern_of(code: Compiled) -> _Pattern:
-    """Return the pattern of a module: eliminated first is what is coupled with fewest others."""
-    rows, columns, numbers = (np.array(x) for x in zip(*code.entries, strict=True))
+@lru_cache(maxsize=16)
+def _pattern_of(entries: Entries, m: int, n: int) -> _Pattern:
+    """Return the pattern of Phi_q: eliminated first is what is coupled with fewest others."""
+    rows, columns, numbers = (np.array(x) for x in zip(*entries, strict=True))
     places: dict[tuple[int, int], int] = {}
 
     def number_of(i: int, j: int) -> int:
         return places.setdefault((max(i, j), min(i, j)), len(places))
 
-    n = len(code.coordinates)
     coupled: dict[int, set[int]] = {column: set() for column in range(n)}
     diagonal = np.array([number_of(column, column) for column in range(n)])
-    rows_of = [np.flatnonzero(rows == row) for row in range(len(code.equations))]
+    rows_of = [np.flatnonzero(rows == row) for row in range(m)]
     products, order = [], []
-    for entries in rows_of:
-        among = list(zip(entries.tolist(), columns[entries].tolist(), strict=True))
+    for own in rows_of:
+        among = list(zip(own.tolist(), columns[own].tolist(), strict=True))
         for k, (first, i) in enumerate(among):
             coupled[i].update(j for _, j in among)
             products += [(number_of(i, j), first, second) for second, j in among[k:]]
@@ -146,10 +161,10 @@ def _pattern_of(code: Compiled) -> _Pattern:
 class _Attempts:
     """What `problem.safeguarded_step` reads, of N problems: arrays (n, N) and (m, N)."""
 
-    def __init__(
-        self, equations: Problem, pattern: _Pattern, sets: Array, t: Array, q: Array
-    ) -> None:
-        self._code, self._pattern, self._t, self._p = equations.code, pattern, t, sets
+    def __init__(self, equations: Problem, sets: Array, t: Array, q: Array) -> None:
+        code = equations.code
+        pattern = _pattern_of(code.entries, len(code.equations), len(code.coordinates))
+        self._code, self._pattern, self._t, self._p = code, pattern, t, sets
         self._reference = equations.reference[:, np.newaxis]
         self._limit = np.broadcast_to(equations.limit, len(pattern.rows_of))[:, np.newaxis]
         self._most = self._reference * np.where(self._code.angular, LARGEST_ANGLE, 1.0)[:, None]
@@ -189,7 +204,7 @@ class _Attempts:
             weights = weights_of(np.maximum(self._magnitude[:, moving], terms))
             residual = weights * Phi
             before = _norms(residual)
-            known = (before > NEAR_MISS) & (sizes.max(axis=0) < WILD)
+            known = (before > ASSEMBLES) & (sizes.max(axis=0) < TOO_STEEP)
             far[moving[~known]] = False
             known &= before < FALLING * earlier[0, moving]
             earlier[:, moving] = np.vstack((earlier[1:, moving], before))

@@ -133,22 +133,24 @@ class _Chunk:
 
     def solve(self) -> None:
         """Solve: compiled, where the module can, and with care what fails."""
-        if self._inputs.code.march is None:
-            self._finish(self._assembled())
-            return
         everyone = np.arange(len(self._p))
+        if self._inputs.code.march is None:
+            self._finish(self._assembled(everyone))
+            return
         status, q = self._marched(everyone, self._begin.q)
         elsewhere = (status[0] != Status.CONVERGED) | self._sets.left_branch(everyone, q)
         self._go_on(everyone[~elsewhere])
         if elsewhere.any():
-            motions = Motion.over(self._inputs, int(elsewhere.sum()))
-            rest = _Chunk(self._inputs, self._begin, self._p[elsewhere], motions)
-            rest._solve_from_own_places(status[0, elsewhere])
-            self._motions.fill(elsewhere, motions)
+            self._solve_from_own_places(everyone[elsewhere], status[0, elsewhere].copy())
 
-    def _solve_from_own_places(self, status: Statuses) -> None:
-        """Solve compiled what is not on the branch from the first position, but from its own."""
-        lanes = self._assembled(status)
+    def _solve_from_own_places(self, variants: Places, status: Statuses) -> None:
+        """Solve compiled what is not on the branch from the first position, but from its own.
+
+        What became of it there is taken back.
+        """
+        self._motions.forget(0, variants)
+        self._motions.forget(slice(None), variants[status == Status.CONVERGED])
+        lanes = self._assembled(variants, status)
         if not lanes.motions.size:
             return
         found, _ = self._marched(lanes.motions, lanes.state.point.q)
@@ -206,35 +208,38 @@ class _Chunk:
                 break
             lanes = self._known(stuck.motions[on], stuck.index[on] + 1)
 
-    def _assembled(self, known: Statuses | None = None) -> Lanes:
-        """Assemble all variants at the first time; return those that are.
+    def _assembled(self, variants: Places, known: Statuses | None = None) -> Lanes:
+        """Assemble variants at the first time; return those that are.
 
         Known may be what the compiled march said of them, as for `Sets.assembled`.
         """
-        inputs, everyone = self._inputs, np.arange(len(self._p))
-        begun = self._sets.assembled(known)
-        state, checks = self._sets.march().complete(begun.point)
+        inputs, sets = self._inputs, Sets(self._inputs, self._begin, self._p[variants])
+        begun = sets.assembled(known)
+        state, checks = sets.march().complete(begun.point)
         good = all_hold(begun.on_branch, checks)
         good &= state.sensitivity <= TOO_NEAR
-        self._record(Lanes(everyone, 0 * everyone, state), state, good, begun.iterations)
-        self._motions.forget(slice(None), ~good)
+        lanes = Lanes(variants, 0 * variants, state)
+        self._record(lanes, state, good, begun.iterations)
+        if known is None:
+            self._motions.forget(slice(None), variants[~good])
         over = ((begun.hopeless, Status.NOT_ASSEMBLED), (begun.left, Status.NOT_CONVERGED))
-        for variants, status in over:
-            self._motions.status[0, variants] = status
+        for some, status in over:
+            self._motions.status[0, variants[some]] = status
         bad = np.setdiff1d(np.flatnonzero(~good), np.union1d(begun.left, begun.hopeless))
-        for variant in bad.tolist():
+        for lane in bad.tolist():
+            variant = int(variants[lane])
             own = replace(inputs, p=self._p[variant])
             outcome = start(self._sets.alone(variant, inputs.guess), self._times[0], own)
             if self._begin.is_assembled and outcome.state is not None:
                 place = outcome.state.point.q[:, np.newaxis]
                 is_known = not inputs.code.redundant  # these have no determinants
-                leaves = is_known and self._sets.leave(np.array([variant]), place)[0]
-                if begun.crosses[variant] or leaves:
+                leaves = is_known and self._sets.leave(variants[[lane]], place)[0]
+                if begun.crosses[lane] or leaves:
                     outcome = Outcome(Status.NOT_CONVERGED, outcome.iterations, None)
-            good[variant] = self._take(0, variant, outcome)
+            good[lane] = self._take(0, variant, outcome)
         if good[bad].any():
-            return self._known(everyone[good], 0 * everyone[good] + 1)
-        return Lanes(everyone, 0 * everyone + 1, state).some(good)
+            return self._known(variants[good], 0 * variants[good] + 1)
+        return replace(lanes, index=lanes.index + 1).some(good)
 
     def _with_care(self, lanes: Lanes) -> Mask:
         """Take variants to their next times alone; say which get there and go on."""

@@ -194,8 +194,8 @@ def record(m: Variants, b: Point, o: Outcome, time: Count, first: Count, count: 
                 m.q_ddot[i, time, first + k] = NOTHING
 
 
-def assemble(m: Variants, b: Point, s: Scales, first: Count, count: Count, o: Outcome):
-    """Assemble variants from their guesses, at the first time."""
+def put_at_guesses(m: Variants, b: Point, s: Scales, first: Count, count: Count, o: Outcome):
+    """Put variants at their guesses, at the first time, and measure their equations."""
     constants(b, lanes=count)
     s.tolerance = m.tolerance
     for i in range(K):
@@ -208,6 +208,11 @@ def assemble(m: Variants, b: Point, s: Scales, first: Count, count: Count, o: Ou
         b.t[k] = m.t[0]
         o.is_over[k] = False
     measure(b, m.size, s, lanes=count)
+
+
+def assemble(m: Variants, b: Point, s: Scales, first: Count, count: Count, o: Outcome):
+    """Assemble variants from their guesses, at the first time."""
+    put_at_guesses(m, b, s, first, count, o)
     correct(b, s, m.max_iterations, o, lanes=count)
     complete(b, s, o, lanes=count)
     # The guess may be rough.
@@ -264,6 +269,7 @@ def put_to_rest(m: Variants, b: Point, o: Outcome, first: Count, count: Count):
     for k in lanes(count):
         if o.is_over[k]:
             o.status[k] = NOT_REACHED
+            o.iterations[k] = 0
         if o.status[k] != CONVERGED:
             o.is_over[k] = True
             for i in range(N):
@@ -272,8 +278,11 @@ def put_to_rest(m: Variants, b: Point, o: Outcome, first: Count, count: Count):
                 b.q_ddot[i][k] = 0.0
 
 
-def march_variants(m: Variants) -> Count:
-    """Follow the motions of variants; return how many converged at all times."""
+def follow_variants(m: Variants, farthest: Real) -> Count:
+    """Follow the motions of variants; return how many converged at all times.
+
+    One that is assembled with an angle that is farther from its guess is not followed.
+    """
     b = Point()
     before = Point()
     s = Scales()
@@ -285,17 +294,31 @@ def march_variants(m: Variants) -> Count:
         assemble(m, b, s, first, count, o)
         put_to_rest(m, b, o, first, count)
         record(m, b, o, 0, first, count)
+        for k in lanes(count):
+            for i in range(N):
+                if MAY_TURN[i] and abs(b.q[i][k] - m.guess[i, first + k]) > farthest:
+                    o.status[k] = NOT_REACHED
+        put_to_rest(m, b, o, first, count)
         for time in range(1, m.count):
-            keep(before, b)
-            t: Lane = m.t[time]
-            step(b, s, t, o, lanes=count)
+            is_going: Bool = False
             for k in lanes(count):
-                if o.status[k] != CONVERGED and not o.is_over[k]:
-                    take_up(at, before, k)
-                    advance(b, s, at, m.t[time], k, o)
+                is_going = is_going or not o.is_over[k]
+            if is_going:
+                keep(before, b)
+                t: Lane = m.t[time]
+                step(b, s, t, o, lanes=count)
+                for k in lanes(count):
+                    if o.status[k] != CONVERGED and not o.is_over[k]:
+                        take_up(at, before, k)
+                        advance(b, s, at, m.t[time], k, o)
             put_to_rest(m, b, o, first, count)
             record(m, b, o, time, first, count)
         for k in lanes(count):
             if not o.is_over[k]:
                 good += 1
     return good
+
+
+def march_variants(m: Variants) -> Count:
+    """Follow the motions of variants; return how many converged at all times."""
+    return follow_variants(m, INFINITE)

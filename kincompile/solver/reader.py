@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from kincompile.solver.nodes import Expression, Statement
 
 
-MARCH, START = ("step", "march"), ("attempt", "start")
+MARCH, START, SETS = ("step", "march"), ("attempt", "start"), "sets"
 """The modules of a text; each builds on the ones before."""
 
 
@@ -65,6 +65,12 @@ def start() -> Text:
     for name in START:
         text = read(source_of(name), text)
     return text
+
+
+@cache
+def solver_of_sets() -> Text:
+    """Return the plain march with what many parameter sets need, read once."""
+    return read(source_of(SETS), solver())
 
 
 @cache

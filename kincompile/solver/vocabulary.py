@@ -22,9 +22,9 @@ TYPES = {
 }
 """Annotations. ``Row[N]``, ``Rows[N]`` and ``Vector[Int]`` are read beside them."""
 
-SIZES = ("N", "M", "K", "LANES", "NONZEROS", "BLOCKS", "U", "X", "ONE")
-"""Coordinates, equations, parameters, points at once, entries of Phi_q, blocks of its solve; inputs
-and outputs of a transmission; 1."""
+SIZES = ("N", "M", "K", "LANES", "NONZEROS", "BLOCKS", "NORMAL", "U", "X", "ONE")
+"""Coordinates, equations, parameters, points at once, entries of Phi_q, blocks of its solve, those
+of a triangle of normal equations; inputs and outputs of a transmission; 1."""
 
 ROOM = ("TALL", "WIDE")
 """Rows and columns of a matrix of least squares: M + N, the equations and what bends a step, and
@@ -51,6 +51,11 @@ START_CRITERIA = (
 )  # fmt: skip
 START_COUNTS = ("MOST_MIRRORED", "RESTARTS")
 """Those that the start judges by besides."""
+
+SETS_CRITERIA = ("ASSEMBLES", "FALLING", "STATIONARY", "TOO_STEEP")
+SETS_COUNTS = ("INVERSE_ITERATIONS",)
+LINE_CRITERIA = ("FIRST_DIFFERENCE", "SECOND_DIFFERENCE")
+"""Those that attempts of many sets are judged by besides; and steps along a line of parameters."""
 
 CAREFUL_COUNTS = ("MAX_ITERATIONS", "PATIENCE")
 CAREFUL_CRITERIA = ("ALLOWED_PART", "LARGE_ERROR", "SINGULAR_SENSITIVITY", "TINY")
@@ -83,7 +88,9 @@ inputs of a transmission are angles."""
 
 CONSTANTS = (
     dict.fromkeys((*SIZES, *ROOM, *STATUSES, *COUNTS, *START_COUNTS, *CAREFUL_COUNTS), INT)
+    | dict.fromkeys(SETS_COUNTS, INT)
     | dict.fromkeys((*CRITERIA, *START_CRITERIA, *CAREFUL_CRITERIA, *TRANSMISSION_CRITERIA), REAL)
+    | dict.fromkeys(SETS_CRITERIA, REAL)
     | dict.fromkeys(("NOTHING", "INFINITE", "TURN"), REAL)
     | TABLES
 )
@@ -133,6 +140,8 @@ WORDS = {
     "take_up": Word(("State", "Point", "Count"), changes=(0,)),
     "put_at": Word(("Point", "State", "Count", "Count"), changes=(0,)),
     "keep": Word(("Point", "Point"), changes=(0,)),
+    # of parameters: the line to those of a table, from a variant on, whose part is now the time
+    "lead": Word(("Point", "Table", "Count"), is_lanewise=True, changes=(0,)),
     # of arrays: a copy; the first lanes of rows into a block, at a time, from a variant on
     "copied": Word(("array",), "same"),
     "store": Word(("Block", "rows", "Count", "Count", "Count"), changes=(0,)),

@@ -15,13 +15,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kincompile.criteria import rounded
+from kincompile.criteria import FIRST_DIFFERENCE, SECOND_DIFFERENCE, rounded
 from kincompile.solver import reader, vocabulary
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 Array = NDArray[Any]
+
+LINE = "line"
+"""Of points that are led: the time, the parameters that all begin at, and their own."""
 
 BASES = {"real": float, "int": np.intc, "bool": bool}
 
@@ -47,10 +50,11 @@ class Mechanism:
 def on_numpy(mechanism: Mechanism, *, is_careful: bool = False) -> ModuleType:
     """Return the texts as a module that solves a mechanism: `march`, `position_from`, structs."""
     n, m = (mechanism.sizes[name] for name in ("N", "M"))
-    sizes = {**mechanism.sizes, "TALL": m + n, "WIDE": n + 1}
-    kernels = _Kernels(mechanism)
-    own = {name: getattr(kernels, name) for name in (*vocabulary.KERNELS, "solve", "missed")}
-    march = _copy_of(reader.MARCH, {}, is_careful=is_careful)
+    sizes = {**mechanism.sizes, "TALL": m + n, "WIDE": n + 1, "NORMAL": n * (n + 1) // 2}
+    kernels, words = _Kernels(mechanism), (*vocabulary.KERNELS, "solve", "missed", "lead")
+    own = {name: getattr(kernels, name) for name in words}
+    texts = reader.MARCH if is_careful else (*reader.MARCH, reader.SETS)
+    march = _copy_of(texts, {}, is_careful=is_careful)
     start = _copy_of(reader.START, vars(march), is_careful=is_careful)
     for text in (march, start):
         vars(text).update(**sizes, **mechanism.tables, **own)
@@ -64,7 +68,7 @@ def _copy_of(parts: Sequence[str], known: Mapping[str, Any], *, is_careful: bool
     """Return a module of its own for a text, which has known names besides."""
     module = ModuleType(f"kincompile.solver.{parts[-1]}")
     vars(module).update({name: x for name, x in known.items() if not name.startswith("_")})
-    modules = {f"kincompile.solver.{x}" for x in (*reader.MARCH, *reader.START)}
+    modules = {f"kincompile.solver.{x}" for x in (*reader.MARCH, *reader.START, reader.SETS)}
     for name in parts:
         tree, _ = reader.chosen(reader.source_of(name), is_careful=is_careful)
         # What stands in another module of the texts is there already, for this mechanism.
@@ -132,9 +136,11 @@ def lanewise(function: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(function)
     def called(*arguments: Any, lanes: int | None = None) -> Any:
-        if lanes is not None:  # a vector that all lanes share is not cut
+        if lanes is not None:  # a vector or row that all lanes share is not cut
             given = zip(arguments, kinds, strict=True)
-            arguments = tuple(x if kind == "Vector" else _first(x, lanes) for x, kind in given)
+            arguments = tuple(
+                x if kind.startswith(("Vector", "Row[")) else _first(x, lanes) for x, kind in given
+            )
         return function(*arguments)
 
     return called
@@ -150,10 +156,27 @@ class _Kernels:
         for row, value in zip(rows, values, strict=True):
             row[:] = value
 
+    def lead(self, b: Any, ends: Array, first: int, lanes: int) -> None:
+        """Lead points from their parameters to those of a table: the part of a line is the time."""
+        vars(b)[LINE] = float(b.t[0]), b.p[:, :1].copy(), ends[:, first : first + lanes]
+        b.t = 0.0
+
+    def _beside(self, b: Any, part: float, q: Array) -> Any:
+        """Evaluate positions a part of their lines beside where points are."""
+        t, begin, ends = vars(b)[LINE]
+        return self.own["position"](q, np.full_like(b.t, t), begin + (b.t + part) * (ends - begin))
+
+    def _differences(self, b: Any, part: float, q_dot: Array) -> tuple[Array, Array]:
+        """Return Phi before and after points that move along lines."""
+        found = (self._beside(b, x, b.q + x * q_dot)[: len(b.Phi)] for x in (-part, part))
+        before, after = (np.array(np.broadcast_arrays(*rows)) for rows in found)
+        return before, after
+
     def position(self, b: Any, lanes: int | None = None) -> None:
         """Evaluate Phi and Phi_q."""
         b = b if lanes is None else _first(b, lanes)
-        values = self.own["position"](b.q, b.t, b.p)
+        is_led = LINE in vars(b)
+        values = self._beside(b, 0.0, b.q) if is_led else self.own["position"](b.q, b.t, b.p)
         m = len(b.Phi)
         self._fill(b.Phi, values[:m])
         for place, value in zip(self.mechanism.varying, values[m:], strict=True):
@@ -161,10 +184,18 @@ class _Kernels:
 
     def nu(self, b: Any) -> None:
         """Evaluate nu."""
+        if LINE in vars(b):
+            before, after = self._differences(b, FIRST_DIFFERENCE, 0.0 * b.q_dot)
+            b.nu = (before - after) / (2 * FIRST_DIFFERENCE)
+            return
         self._fill(b.nu, self.own["nu"](b.q, b.t, b.p))
 
     def gamma(self, b: Any) -> None:
         """Evaluate gamma."""
+        if LINE in vars(b):
+            before, after = self._differences(b, SECOND_DIFFERENCE, b.q_dot)
+            b.gamma = (2 * b.Phi - before - after) / SECOND_DIFFERENCE**2
+            return
         self._fill(b.gamma, self.own["gamma"](b.q, b.q_dot, b.t, b.p))
 
     def factor(self, b: Any, lanes: int | None = None) -> None:
@@ -188,19 +219,26 @@ class _Kernels:
             total[:] = np.sum(weight * rest * rest, axis=0)
 
     def constants(self, b: Any, lanes: int) -> None:
-        """Put the entries of Phi_q that never change in place."""
+        """Put the entries of Phi_q that never change in place; no point is led."""
+        vars(b).pop(LINE, None)
         b.Phi_q[:, :lanes] = self.mechanism.start[:, np.newaxis]
 
 
 def take_up(at: Any, b: Any, k: int) -> None:
     """Take up a lane as a good point."""
-    for name in vars(at):
+    for name in vars(at).keys() - {LINE}:
         setattr(at, name, vars(b)[name][..., k].copy())
+    if LINE in vars(b):
+        *line, ends = vars(b)[LINE]
+        vars(at)[LINE] = *line, ends[:, [k]]
 
 
 def put_at(b: Any, at: Any, first: int, end: int) -> None:
     """Put lanes, from one to before another, at a good point."""
     for name, value in vars(at).items():
+        if name == LINE:
+            vars(b).setdefault(LINE, value)  # that of lanes which are put back is theirs
+            continue
         vars(b)[name][..., first:end] = value[:, np.newaxis] if np.ndim(value) else value
 
 
@@ -247,6 +285,6 @@ CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE, NOT_REACHED, LOCK_UP = vocabular
 IS_CAREFUL = False
 
 # Until a mechanism gives its own:
-N = M = K = U = X = ONE = LANES = NONZEROS = BLOCKS = TALL = WIDE = 0
+N = M = K = U = X = ONE = LANES = NONZEROS = BLOCKS = NORMAL = TALL = WIDE = 0
 ANGULAR = IS_REDUNDANT = PROBE = PATTERN = MAY_TURN = COVER = IS_ANGLE = ()
-position = factor = nu = gamma = constants = solve = missed = evaluate = any_lane
+position = factor = nu = gamma = constants = solve = missed = lead = evaluate = any_lane

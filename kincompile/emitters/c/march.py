@@ -41,8 +41,14 @@ if TYPE_CHECKING:
 BASES = {"real": "double", "int": "int", "count": "size_t", "bool": "int", "nothing": "void"}
 GIVEN = {"Point": "strip", "State": "state"}
 """Structs whose layout the templates write, and their names there."""
-PUBLIC = ("march_variants",)
+PUBLIC = (
+    "march_variants", "follow_variants", "attempt_variants", "mirror_variants", "lead_variants"
+)  # fmt: skip
 """Functions that the header declares."""
+APART = ("weigh", "eliminate", "substitute", "direct", "descend", "mirror")
+"""Functions that a compiler need not put in line: they would take it a second."""
+ON_LINES = ("position", "nu", "gamma")
+"""Kernels that have others beside them for points on lines of parameters."""
 NUMBERS = {"NOTHING": "NAN", "INFINITE": "INFINITY"}
 AT_LEAST_ONE = ("BLOCKS", "K")
 """Sizes that may be 0, of which C has no arrays."""
@@ -102,11 +108,13 @@ class CSolver(SolverPrinter):
             is_changed = name in item.changes or kind.base == "Point"
             is_const = not is_changed or kind.base == "Variants"
             return f"{'const ' * is_const}{self.kind(kind.base)} *{name}"
+        if len(kind.dims) == 2 and kind.dims[0] == "any":
+            return f"{self.name}_input {name}"
         return f"{'const ' if kind.dims else ''}{BASES[kind.base]} {'*' * bool(kind.dims)}{name}"
 
     def linkage(self, name: str) -> str:
         """Return what stands before a function: that it is of the file alone."""
-        return "" if name in PUBLIC else "static "
+        return "" if name in PUBLIC else "_never_inline " if name in APART else "static "
 
     def head(self, item: Function) -> Lines:
         """Return the first lines of a function."""
@@ -333,7 +341,11 @@ class CSolver(SolverPrinter):
                 parts += map(self.expression, rest)
                 return f"store({self.place(block)}, {', '.join(parts)})", ATOM
         is_kernel = node.name in (*KERNELS, "missed")
-        name = self.calls.get(node.name, node.name) + "_of_strip" * is_kernel
+        name = self.calls.get(node.name, node.name)
+        if name in PUBLIC:
+            name = f"{self.name}_{name}"
+        if is_kernel:
+            name += "_on_line" if name in ON_LINES else "_of_strip"
         parameters: tuple[Variable | None, ...] = (None,) * len(node.arguments)
         is_lanewise = node.name in WORDS and WORDS[node.name].is_lanewise
         if node.name in self.functions:

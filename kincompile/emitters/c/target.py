@@ -12,10 +12,10 @@ from kincompile.emitters.constants import items, named_lists
 from kincompile.emitters.lines import WIDTH, indented, wrapped
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.printer import ELEMENTARY
-from kincompile.emitters.solver_tables import NUMBERS, solver_tables
+from kincompile.emitters.solver_tables import NUMBERS, OF_SETS, solver_tables
 from kincompile.quantities import nonzeros_of
 from kincompile.report.templates import fill
-from kincompile.solver.reader import solver, start
+from kincompile.solver.reader import solver_of_sets, start
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -269,7 +269,8 @@ def _splines(program: Program) -> Iterable[str]:
 @lru_cache(maxsize=16)
 def _solver(name: str) -> dict[str, str]:
     """Return printed start and march, which depend on nothing but the name of the mechanism."""
-    return {"start": CSolver(start(), name).text(), "solver": CSolver(solver(), name).text()}
+    texts = {"solver": solver_of_sets(), "start": start()}
+    return {part: CSolver(text, name).text() for part, text in texts.items()}
 
 
 def _march(program: Program) -> dict[str, str]:
@@ -278,4 +279,5 @@ def _march(program: Program) -> dict[str, str]:
         name: _array_lines(items(values, ("0", "1")))
         for name, values in solver_tables(program).items()
     }
-    return {**tables, **_solver(program.name), **{name: repr(x) for name, x in NUMBERS.items()}}
+    numbers = {name: repr(x) for name, x in {**NUMBERS, **OF_SETS}.items()}
+    return {**tables, **_solver(program.name), **numbers}

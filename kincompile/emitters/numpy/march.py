@@ -52,7 +52,7 @@ NAMES = {
     "NOTHING": "math.nan",
 }  # fmt: skip
 """What has another name in a module; all others of the text have an underscore before theirs."""
-OF_VARIANTS = ("march_variants", "put_to_rest")
+OF_VARIANTS = ("follow_variants", "march_variants", "put_to_rest")
 """Functions that are left out, since one motion needs none of them."""
 TABLES = ("ANGULAR", "IS_REDUNDANT", "PROBE")
 """Tables of a mechanism that the march reads; PATTERN is there already."""

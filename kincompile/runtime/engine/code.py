@@ -126,6 +126,11 @@ class Compiled:
     evaluate: Callable[..., tuple[Array, Array]] | None
     # Of a compiled module: its own march over times, of one motion or of many parameter sets.
     march: Callable[..., int] | None
+    # Of a compiled module: its own safeguarded attempts by many parameter sets, what goes beyond
+    # singular positions of many, and what leads a position along lines to many.
+    attempts: Callable[..., NDArray[np.bool_]] | None
+    mirror: Callable[..., Array] | None
+    lead: Callable[..., tuple[Array, NDArray[np.intc]]] | None
     # Of a module with outputs: puts them and their rates at states (n, N) into (3, r, N).
     observe_into: Callable[..., None] | None
     # Of a module with outputs: gives them at one state of plain floats, (q, q_dot, q_ddot, t, p);
@@ -340,6 +345,9 @@ def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compi
         blocks=names.get("BLOCKS", ()),
         evaluate=names.get("evaluate"),
         march=names.get("compiled_march"),
+        attempts=names.get("compiled_attempts"),
+        mirror=names.get("compiled_mirror"),
+        lead=names.get("compiled_lead"),
         observe_into=_observing(names, lanes),
         observe_floats=observe and partial(observe, names["FLOATS"]),
         origin=names.get(ORIGIN),

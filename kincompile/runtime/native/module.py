@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import ctypes
 import math
-from ctypes import byref, c_size_t
+from ctypes import byref, c_double, c_size_t, c_void_p
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile import quantities
+from kincompile.criteria import FAR
 from kincompile.errors import InputError
 from kincompile.runtime.engine.code import ORIGIN, attach, code_of
 from kincompile.runtime.memory import empty
@@ -34,6 +35,7 @@ from kincompile.runtime.native.points import (
     numbers_of_batch,
     numbers_of_times,
 )
+from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -71,6 +73,9 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     if "solve" in names:
         compiled["solve"] = functions.solve(names["_system"])
         compiled["compiled_march"] = functions.march()
+        compiled["compiled_attempts"] = functions.attempts()
+        compiled["compiled_mirror"] = functions.mirror()
+        compiled["compiled_lead"] = functions.lead()
         lanes = names["LANES"]
         names["LANES"] = {**lanes, "position": functions.position_of_lanes(lanes["position"])}
     if "observe" in names:
@@ -298,9 +303,10 @@ class _Functions:
     def march(self) -> Function:
         """Return the march over a time grid."""
         one, many = (
-            getattr(self._library, f"{self._name}_{name}") for name in ("march", "march_variants")
+            getattr(self._library, f"{self._name}_{name}") for name in ("march", "follow_variants")
         )
         one.restype = many.restype = c_size_t
+        many.argtypes = c_void_p, c_double
 
         def march(
             inputs: Inputs,
@@ -318,8 +324,9 @@ class _Functions:
             Fills `states` (3, n, N) with position, velocity and acceleration, and of every point
             the largest absolute value of Phi, the `Status` and the Newton iterations, (N,) each.
             Given sets of parameters (B, k), it does so for each, from one guess (n,) or from one
-            of each (n, B); all that is filled has B as its last axis. Returns how many points
-            converged, from the first one on, or how many of the sets did at all times.
+            of each (n, B); all that is filled has B as its last axis. One that is assembled with
+            an angle far from its guess is on another branch, and is not followed. Returns how many
+            points converged, from the first one on, or how many of the sets did at all times.
             """
             motion: Any
             t = inputs.t
@@ -327,17 +334,89 @@ class _Functions:
                 motion = Motion(t.size, t.ctypes.data, inputs.p.ctypes.data, guess.ctypes.data)
                 first = states
             else:
-                given = [numbers_of_batch(x) for x in (sets.T, guess)]
-                motion = Variants(t.size, len(sets), t.ctypes.data, *given)
-                motion.time, first = states.strides[2] // NUMBER, states[:, :, 0]
+                motion, first = _variants(t, sets, guess), states[:, :, 0]
+                motion.time = states.strides[2] // NUMBER
             motion.size, motion.tolerance = size, tolerance
             motion.max_iterations = inputs.max_iterations
             motion.q, motion.q_dot, motion.q_ddot = map(numbers_of_batch, first)
             said = (residual, status, iterations)
             motion.residual, motion.status, motion.iterations = (x.ctypes.data for x in said)
-            return int((one if sets is None else many)(byref(motion)))
+            return int(one(byref(motion)) if sets is None else many(byref(motion), FAR))
 
         return march
+
+    def attempts(self) -> Function:
+        """Return safeguarded attempts of many parameter sets."""
+        run = getattr(self._library, f"{self._name}_attempt_variants")
+        run.restype = None
+
+        def attempts(
+            sets: Array, t: float, q: Array, size: float, max_iterations: int
+        ) -> NDArray[np.bool_]:
+            """Say which of sets (B, k) come near to a position at a time, from positions (n, B).
+
+            The positions become those that were reached.
+            """
+            status = np.empty(len(sets), dtype=np.intc)
+            motion = _variants(np.array([t]), sets, q)
+            motion.size, motion.max_iterations = size, max_iterations
+            motion.q, motion.status = numbers_of_batch(q), status.ctypes.data
+            run(byref(motion))
+            found: NDArray[np.bool_] = status == Status.CONVERGED
+            return found
+
+        return attempts
+
+    def mirror(self) -> Function:
+        """Return what goes beyond the nearest singular positions of many parameter sets."""
+        run = getattr(self._library, f"{self._name}_mirror_variants")
+        run.restype, run.argtypes = None, (c_void_p, c_void_p)
+
+        def mirror(sets: Array, t: float, q: Array, size: float, magnitude: Array) -> Array:
+            """Return about where sets (B, k) can be assembled there, (n, B), of positions (n, B).
+
+            Equations are measured by magnitudes (m,).
+            """
+            found = np.empty_like(q, order="C")
+            motion = _variants(np.array([t]), sets, q)
+            motion.size, motion.q = size, numbers_of_batch(found)
+            run(byref(motion), magnitude.ctypes.data)
+            found[:, ~np.isfinite(found).all(axis=0)] = np.nan
+            return found
+
+        return mirror
+
+    def lead(self) -> Function:
+        """Return what leads a position along lines of parameters."""
+        run = getattr(self._library, f"{self._name}_lead_variants")
+        run.restype, run.argtypes = None, (c_void_p, Numbers)
+
+        def lead(
+            p: Array, t: float, guess: Array, sets: Array, size: float, tolerance: float, most: int
+        ) -> tuple[Array, NDArray[np.intc]]:
+            """Lead a position with parameters p (k,) at a time to sets (B, k).
+
+            Return where it came to, (n, B), and the `Status` of each.
+            """
+            found = np.empty((3, guess.size, len(sets)))
+            residual, (status, iterations) = np.empty(len(sets)), np.empty((2, len(sets)), np.intc)
+            motion = _variants(np.array([t]), np.broadcast_to(p, sets.shape), guess)
+            motion.size, motion.tolerance, motion.max_iterations = size, tolerance, most
+            motion.q, motion.q_dot, motion.q_ddot = map(numbers_of_batch, found)
+            said = (residual, status, iterations)
+            motion.residual, motion.status, motion.iterations = (x.ctypes.data for x in said)
+            run(byref(motion), numbers_of_batch(sets.T))
+            return found[0], status
+
+        return lead
+
+
+def _variants(t: Array, sets: Array, guess: Array) -> Variants:
+    """Return motions of parameter sets (B, k) from guesses; what they read is kept with them."""
+    given = [numbers_of_batch(x) for x in (sets.T, guess)]
+    motion = Variants(t.size, len(sets), t.ctypes.data, *given)
+    motion.kept = t, sets, guess  # C reads through addresses: the arrays must live as long
+    return motion
 
 
 def _shapes(code: Compiled) -> dict[str, tuple[int, ...]]:

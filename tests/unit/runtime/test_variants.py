@@ -324,6 +324,25 @@ def test_that_a_set_that_cannot_move_takes_few_evaluations(four_bar, monkeypatch
     assert alone[0] <= 2 * of_first  # a position alone costs as much as a hundred in arrays
 
 
+def test_that_compiled_code_leads_and_attempts_without_arrays(
+    example_named, quick_compiler, monkeypatch
+):
+    module, calls = example_named("four_bar").native, []
+    evaluate = Planned.evaluate
+
+    def counted(self, q, t):
+        calls.append(q.shape)
+        return evaluate(self, q, t)
+
+    monkeypatch.setattr(Planned, "evaluate", counted)
+    t, longer = np.linspace(0, 4, 20), np.where(np.arange(64) % 2, 2, 1)
+    for factor, status in ((longer, Status.NOT_ASSEMBLED), (1.5 * longer, Status.CONVERGED)):
+        calls.clear()
+        found = kc.solve(module, t, {"a": module.DEFAULTS[0] * factor})
+        assert (found.status[1::2, 0] == status).all()
+        assert len(calls) < 40  # on arrays every step of every attempt takes some
+
+
 def parallelogram():
     """Return a mechanism that comes to a bifurcation at t = 0.5."""
     m = kc.Mechanism("parallelogram")
