@@ -54,7 +54,7 @@ const transmission = {
     panel.innerHTML = TRANSMISSION_MARKUP;
     this.part('.where').hidden = ends.inputs.length > 2;
     this.begin();
-    byId('first-pose').addEventListener('click', () => this.set(this.branch.home.u));
+    byId('first-pose').addEventListener('click', () => this.first());
     this.listen();
   },
 
@@ -125,6 +125,13 @@ const transmission = {
     });
   },
 
+  /* Go back to the first pose: to that itself, not on a way that may end a rounding beside it. */
+  first() {
+    const { home } = this.branch;
+    this.pose = isReached(home) ? home : null;
+    this.set(home.u);
+  },
+
   /* Go to the inputs from the last pose; where no straight way leads there, from the first one, as f(u) in Python, or from the
      nearest of the map. */
   find() {
@@ -134,7 +141,7 @@ const transmission = {
     const starts = [this.pose, home, this.map?.near(this.u)].filter(Boolean);
     this.isAround = false;
     for (const start of starts) {
-      this.found = branch.go(start, this.u);
+      this.found = start.u.every((x, k) => x === this.u[k]) ? start : branch.go(start, this.u);
       if (isReached(this.found)) break;
       this.isAround = true;
     }
