@@ -83,7 +83,8 @@ def reference(name: str) -> TransmissionReference:
 
 
 def compared(name: str, **given: Any) -> Report:
-    return kc.compare(reference(name), **given)
+    report: Report = kc.compare(reference(name), **given)
+    return report
 
 
 def named(report: Report, *words: str) -> bool:

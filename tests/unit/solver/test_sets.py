@@ -85,8 +85,10 @@ def test_that_lines_of_parameters_lead_where_steps_on_arrays_do(
     given = inputs.p, 0.0, q, p, equations.size, TOLERANCE, MAX_ITERATIONS
     begins = np.repeat(inputs.p[np.newaxis], COUNT, axis=0)
     guesses = np.repeat(q[:, np.newaxis], COUNT, axis=1)
+    lead = code_of(example.native).lead
+    assert lead is not None
     ways = (
-        partial(code_of(example.native).lead, *given),
+        partial(lead, *given),
         partial(on_text, module, 7, "lead_variants", begins, guesses, p.T),
     )
     for way in ways:
