@@ -158,12 +158,13 @@ def given_states(given: Mapping[str, ArrayLike], system: ConstraintSystem) -> St
         )
     count = len(np.atleast_2d(np.asarray(given["q"], dtype=float)))
     shapes = {"q": (count, n), "q_dot": (count, n), "t": (count,), "p": (count, defaults.size)}
-    arrays = {name: _shaped(values[name], name, shape) for name, shape in shapes.items()}
+    arrays = {name: shaped(values[name], name, shape) for name, shape in shapes.items()}
     _, group = np.unique(arrays["p"], axis=0, return_inverse=True)
     return States(**arrays, group=np.asarray(group).reshape(count))
 
 
-def _shaped(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
+def shaped(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Array:
+    """Return finite numbers of a shape; an `InputError` says which of the states has others."""
     try:
         array = np.broadcast_to(np.asarray(value, dtype=float), shape)
     except (TypeError, ValueError):

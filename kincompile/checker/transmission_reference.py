@@ -14,7 +14,7 @@ import numpy as np
 
 from kincompile.checker.comparison import Difference
 from kincompile.checker.reference import Reference
-from kincompile.checker.states import GROUPS, SEED, STATES_PER_GROUP, Array, States
+from kincompile.checker.states import GROUPS, SEED, STATES_PER_GROUP, Array, States, shaped
 from kincompile.errors import InputError
 from kincompile.names import listed, rate
 
@@ -241,17 +241,7 @@ class TransmissionReference(Reference):
                 f"states has {listed(given)}; give 'u', and where they matter {listed(sizes)}."
             )
         count = len(np.atleast_2d(np.asarray(given["u"], dtype=float)))
-        found = {}
-        for name, value in given.items():
-            try:
-                found[name] = np.broadcast_to(np.asarray(value, float), (count, sizes[name]))
-            except (TypeError, ValueError):
-                raise InputError(
-                    f"states: {name} has shape {np.shape(value)}; it should be "
-                    f"{(count, sizes[name])}, or broadcast to it."
-                ) from None
-            if not np.isfinite(found[name]).all():
-                raise InputError(f"states: {name} holds a number that is not finite.")
+        found = {name: shaped(value, name, (count, sizes[name])) for name, value in given.items()}
         u = found.pop("u")
         p = found.pop("p", np.tile(self.defaults[: len(self.own)], (count, 1)))
         if not (poses := self._poses(u, p)).success:

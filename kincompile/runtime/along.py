@@ -95,9 +95,8 @@ def lead_together(
     q = np.repeat(begin[:, np.newaxis], count, axis=1)
     reached, crosses = np.zeros((2, count), dtype=bool)
     everyone = np.arange(count)
-    if (
-        inputs.code.lead is not None
-    ):  # what it has no word for, a bifurcation, is left to steps here
+    # Compiled code has no word for a bifurcation: that is left to the steps here.
+    if inputs.code.lead is not None:
         given = inputs.p, time, begin, sets, equations.size, inputs.tolerance
         found, known = inputs.code.lead(*given, inputs.max_iterations)
         reached = known == Status.CONVERGED
