@@ -74,14 +74,14 @@ def transmission_option(text: str) -> Callable[[Command], Command]:
 def _ends(context: click.Context, option: click.Parameter, given: str | None) -> Ends | None:
     """Return the names of inputs and of outputs."""
     del context, option
-    if given is not None and (ends := transmission_ends(given)) is not None:
-        return ends
     if given is None:
         return None
-    raise InputError(
-        f"--transmission {given} is not of the form INPUTS:OUTPUTS; write names with commas, "
-        "as left,right:pitch,roll"
-    )
+    if (ends := transmission_ends(given)) is None:
+        raise InputError(
+            f"--transmission {given} is not of the form INPUTS:OUTPUTS; write names with commas, "
+            "as left,right:pitch,roll"
+        )
+    return ends
 
 
 def tabled_ends(model: str) -> Ends | None:
