@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.checker.comparer import NUMBERS
 from kincompile.checker.transmission_comparer import TransmissionComparer
+from kincompile.checker.transmission_reference import Transmission
 from kincompile.checker.written import (
     REPORTED,
     argument_names,
@@ -17,16 +18,19 @@ from kincompile.errors import InputError
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import ArrayLike
 
     from kincompile.checker.conventions import Stated
     from kincompile.checker.report import Report
+    from kincompile.checker.states import Array
     from kincompile.checker.transmission_reference import TransmissionReference
     from kincompile.checker.written import Written
 
 Readings = dict[str, list["Written"]]
+OF_INVERSE = {"u": "x", "u_dot": "x_dot", "tau_x": "tau_u"}
+"""What the arguments of the inverse's methods are of the transmission."""
 
 
 def read_maps(
@@ -50,8 +54,7 @@ def read_maps(
 
         try:
             if callable(value) and not hasattr(value, "free_symbols"):
-                choices = reference.arguments(name, argument_names(value))
-                readings[name] = [from_function(name, value, reference, item) for item in choices]
+                readings[name] = _functions(reference, name, value)
             else:
                 readings[name] = [read_written(name, value, words, reference, at_states, check)]
             problems += check(*readings[name][0].shape)
@@ -60,6 +63,35 @@ def read_maps(
     if problems:
         raise InputError(problems)
     return readings
+
+
+def _functions(
+    reference: TransmissionReference, quantity: str, value: Callable[..., object]
+) -> list[Written]:
+    """Return a function in the ways in which its arguments may be meant.
+
+    A method of a transmission takes all states at once, and parameters by name. That of the inverse
+    has outputs in the place of inputs.
+    """
+    names, f = argument_names(value), reference.f
+    own = value if isinstance(value, Transmission) else getattr(value, "__self__", None)
+    if not isinstance(own, Transmission) or names is None:
+        choices = reference.arguments(quantity, names)
+        return [from_function(quantity, value, reference, item) for item in choices]
+    if own.inputs not in (f.inputs, f.outputs):
+        raise InputError(
+            f"{quantity} is a function of {listed(own.inputs)}; give one of {listed(f.inputs)}, or "
+            f"of {listed(f.outputs)}, in this order."
+        )
+    given = names if own.inputs == f.inputs else [OF_INVERSE.get(name, name) for name in names]
+
+    def by_name(*arguments: Array) -> object:
+        pairs = zip(given, arguments, strict=True)
+        named = [dict(zip(reference.own, x.T, strict=True)) if k == "p" else x for k, x in pairs]
+        return value(*named)
+
+    (arguments,) = reference.arguments(quantity, given)
+    return [from_function(quantity, by_name, reference, arguments, is_of_many=True)]
 
 
 def _shape_problems(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
@@ -16,7 +17,7 @@ from kincompile.checker.agreement import Given
 from kincompile.checker.matrix_text import Cell, split_matrix
 from kincompile.checker.notation import IMAGINARY, plain, real
 from kincompile.checker.reference import MATRICES
-from kincompile.errors import InputError
+from kincompile.errors import InputError, SingularConfigurationWarning
 from kincompile.files.data_text import MAX_PROBLEMS
 from kincompile.files.formula_text import ExpressionError
 from kincompile.files.safe_expressions import (
@@ -399,12 +400,20 @@ def _from_array(quantity: str, given: Array, at_states: bool) -> Written:
 
 
 def from_function(
-    quantity: str, function: Callable[..., object], reference: Reference, names: Sequence[str]
+    quantity: str,
+    function: Callable[..., object],
+    reference: Reference,
+    names: Sequence[str],
+    *,
+    is_of_many: bool = False,
 ) -> Written:
-    """Return a function that is called with values of these names, one state after the other."""
+    """Return a function that is called with values of these names, one state after the other.
 
-    def at(states: States, k: int) -> Array:
-        """Return the values at one state, (rows, columns)."""
+    One that `is_of_many` takes all states at once, along the first axis.
+    """
+
+    def at(states: States, k: int | slice) -> Array:
+        """Return the values at one state, or at several, (N, rows, columns)."""
         # Copies: what a function does to its arguments must not change the states.
         arguments = [np.copy(reference.argument(name, states)[k])[()] for name in names]
         try:
@@ -418,22 +427,37 @@ def from_function(
                 f"{quantity}: the function raises {type(error).__name__}: {error}, at {values}. "
                 "Give one that returns an array of real numbers there."
             ) from error
-        return value if quantity in MATRICES else value.reshape(-1, 1)
+        return _of_states(quantity, value if isinstance(k, slice) else value[None])
 
     def evaluate(states: States) -> Given:
-        with np.errstate(all="ignore"):
-            values = np.stack([at(states, k) for k in range(len(states))])
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            # Where a name is read as another, there may be no such pose.
+            warnings.simplefilter("ignore", SingularConfigurationWarning)
+            parts = [slice(None)] if is_of_many else range(len(states))
+            values = np.concatenate([at(states, k) for k in parts])
         none = np.zeros_like(values)
         return Given(values, np.abs(values), none, none, none + rounding.OF_FUNCTION)
 
-    shape = np.atleast_2d(at(reference.random, 0)).shape
+    shape = at(reference.random, slice(None) if is_of_many else 0).shape
     return Written(
-        _no_texts(shape),
+        _no_texts(shape[1:]),
         evaluate,
         rounding="its values agree to six digits, as differences and single precision do",
         arguments=tuple(names),
         takes_parameters="p" in names,
     )
+
+
+def _of_states(quantity: str, values: Array) -> Array:
+    """Return what a function gives at states, (N, ...), as rows and columns, (N, rows, columns)."""
+    if quantity not in MATRICES:
+        values = values.reshape(len(values), -1, 1)
+    if values.ndim > 3:
+        raise InputError(
+            f"{quantity}: the function returns an array of {values.ndim - 1} axes; give one that "
+            "returns rows of numbers."
+        )
+    return values.reshape(len(values), *(1,) * (3 - values.ndim), *values.shape[1:])
 
 
 def argument_names(function: Callable[..., object]) -> list[str] | None:
