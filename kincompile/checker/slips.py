@@ -195,7 +195,9 @@ class Slips:
                 for other in others:
                     found |= dict.fromkeys((other, _partner(other)))
         if self._quantity in ("gamma", "J_dot"):
-            found |= dict.fromkeys(sympy.Symbol(rate(item)) for item in reference.base.coordinates)
+            known = reference.inputs(self._states)
+            rates = (rate(name) for name in reference.symbols)
+            found |= dict.fromkeys(sympy.Symbol(name) for name in rates if name in known)
         words = [item for item in found if not item.is_number][:MOST_WORDS]
         return words, self._values(words)
 

@@ -15,10 +15,11 @@ from kincompile.checker.written import (
     vocabulary,
 )
 from kincompile.errors import InputError
+from kincompile.model.inputs import input_name
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -78,7 +79,7 @@ def _functions(
     if not isinstance(own, Transmission) or names is None:
         choices = reference.arguments(quantity, names)
         return [from_function(quantity, value, reference, item) for item in choices]
-    if own.inputs not in (f.inputs, f.outputs):
+    if own.inputs != f.inputs and not _are_same(own.inputs, f.outputs):
         raise InputError(
             f"{quantity} is a function of {listed(own.inputs)}; give one of {listed(f.inputs)}, or "
             f"of {listed(f.outputs)}, in this order."
@@ -94,6 +95,12 @@ def _functions(
     return [from_function(quantity, by_name, reference, arguments, is_of_many=True)]
 
 
+def _are_same(one: Sequence[str], other: Sequence[str]) -> bool:
+    """Return whether names are the same, of drivers those that an inverse gives them."""
+    pairs = list(zip(one, other, strict=False))
+    return len(one) == len(other) and all(a == b or b in (input_name(a), a) for a, b in pairs)
+
+
 def _shape_problems(
     reference: TransmissionReference, name: str, rows: int, columns: int
 ) -> list[str]:
@@ -107,12 +114,14 @@ def _shape_problems(
             f"{name} is {rows} x {columns}; expected {n} x {m}, a row for each of "
             f"{listed(f.outputs)} and a column for each of {listed(f.inputs)}, or its transpose"
         ]
-    counts = {n: f.outputs} if name == "x" else {m: f.inputs}
-    if name == "effort" and m == n:
-        counts = {m: f.inputs}
-    if columns == 1 and rows in counts:
+    if name == "x" and f.twists:
+        return [
+            f"x of {f.name} has velocities in it, {listed(f.twists)}, and no position gives them: "
+            "compare J, or leave them out of the outputs"
+        ]
+    count, names = (n, f.outputs) if name == "x" else (m, f.inputs)
+    if (rows, columns) == (count, 1):
         return []
-    ((count, names),) = counts.items()
     return [
         f"{name} is {rows} x {columns}; it is a vector: expected {count} rows, one for each of "
         f"{listed(names)}"

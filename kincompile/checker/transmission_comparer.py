@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import permutations
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy
+from scipy.optimize import linear_sum_assignment  # type: ignore[attr-defined]
 
 from kincompile.checker.agreement import (
     OF_ROW,
@@ -27,6 +28,7 @@ from kincompile.checker.conventions import LOAD
 from kincompile.checker.diagnosis import defined, looked_up, undecided_diagnosis
 from kincompile.checker.entry_faults import TypedEntry
 from kincompile.checker.fault import Fault, Kind
+from kincompile.checker.reference import OF_TRANSMISSIONS
 from kincompile.checker.report import Report
 from kincompile.checker.transmission_faults import (
     HandEntry,
@@ -48,7 +50,8 @@ if TYPE_CHECKING:
     from kincompile.checker.transmission_reference import PoseStates, TransmissionReference
     from kincompile.checker.written import Written
 
-MOST_PERMUTED = 6
+MOST_PERMUTED = 16
+"""Rows and columns whose order is looked for; that takes as many trials as rows squared."""
 NOT_ENERGY = "energy is not conserved: effort is not J^T of the velocities"
 
 
@@ -83,6 +86,11 @@ class Laid:
     def column_names(self) -> tuple[str, ...]:
         """Names of the columns as written."""
         return tuple(self.map.columns[k] for k in self.columns)
+
+    def taken(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> Laid:
+        """Return the quantity, laid out plainly so far, with other right rows and columns."""
+        right = self.right[:, list(rows)][:, :, list(columns)]
+        return replace(self, right=right, rows=rows, columns=columns)
 
     def conventions(self) -> Iterator[Convention]:
         """Yield what is another way of writing."""
@@ -120,8 +128,8 @@ class TransmissionComparer:
         )
         self._faults = MatrixFaults(reference, states)
         self._laid: dict[str, Laid] = {}
-        for name, written in readings.items():
-            self._laid[name] = self._best(name, written)
+        for name in sorted(readings, key=OF_TRANSMISSIONS.index):  # J first: others belong to it
+            self._laid[name] = self._best(name, readings[name])
 
     @property
     def wrong_count(self) -> int:
@@ -184,18 +192,22 @@ class TransmissionComparer:
         return [item for item in found if stated in ("", item.kind)]
 
     def _ordered(self, plain: Laid) -> Laid:
-        """Return rows and columns in the order in which they are right, if there is one."""
-        best, (count, width) = plain, plain.equal.shape
-        if self._strict or not plain.wrong_count or max(count, width) > MOST_PERMUTED:
-            return best
-        for columns in permutations(range(width)) if count > 1 else [plain.columns]:
-            right = plain.right[:, :, list(columns)]
-            match = np.array([
-                [bool(np.all(agrees(plain.given[:, i], right[:, k]))) for k in range(count)]
-                for i in range(count)
-            ])  # fmt: skip
-            rows = _rows(match)
-            other = replace(plain, right=right[:, list(rows)], rows=rows, columns=columns)
+        """Return rows and columns in the order in which they are right, if there is one.
+
+        Beside a J that is right its order is that of J_dot; that of effort and x may be too.
+        """
+        velocities, (count, width) = self._laid.get("J"), plain.equal.shape
+        if self._strict or max(count, width) > MOST_PERMUTED:
+            return plain
+        if velocities is not None and not velocities.wrong_count:
+            names = velocities.row_names, velocities.column_names
+            own = plain.taken(*(_order(x, names) for x in (plain.map.rows, plain.map.columns)))
+            return (
+                own if plain.quantity == "J_dot" or own.wrong_count < plain.wrong_count else plain
+            )
+        best = plain
+        for rows, columns in _orders(plain) if plain.wrong_count else ():
+            other = plain.taken(rows, columns)
             if _is_better(other, best):
                 best = other
         return best
@@ -427,24 +439,41 @@ class TransmissionComparer:
         if matrix is None or effort.map.effort != "tau_x":
             return False
         by_row = np.empty_like(matrix)
-        by_row[:, list(effort.rows)] = matrix
+        by_row[:, list(effort.rows)] = -matrix if self._stated.is_load else matrix
         return all(
             is_close(by_row[:, i, j], own[:, j, i]) for i, j in np.ndindex(*by_row.shape[1:])
         )
 
 
-def _rows(match: Array) -> tuple[int, ...]:
-    """Return the right row of each row by hand: where it matches, else its own or what is left."""
-    found: dict[int, int] = {}
-    for i, own in enumerate(match):
-        free = [int(k) for k in np.flatnonzero(own) if k not in found.values()]
-        if free:
-            found[i] = i if i in free else free[0]
-    for i in range(len(match)):
-        if i not in found:
-            rest = [k for k in range(len(match)) if k not in found.values()]
-            found[i] = i if i in rest else rest[0]
-    return tuple(found[i] for i in range(len(match)))
+def _order(own: Sequence[str], orders: Sequence[Sequence[str]]) -> tuple[int, ...]:
+    """Return rows or columns in the order that another quantity has for their names."""
+    names = next((x for x in orders if set(x) == set(own)), own)
+    return tuple(map(own.index, names))
+
+
+def _orders(plain: Laid) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """Yield the right rows and columns that rows and columns by hand may be.
+
+    Each row is taken for each right one. The entries that both have say which columns they are;
+    with these all rows are found, and with the rows all columns.
+    """
+    given, right = plain.given[:, :, None, :, None], plain.right[:, None, :, None, :]
+    equal = np.all(agrees(given, right), axis=0)  # by row, right row, column and right column
+    count, _, width, _ = equal.shape
+    every = np.arange(count), np.arange(width)
+    alike = equal.any(axis=1).mean(axis=0)  # what columns share, in whatever rows
+    for row, other in product(range(count), repeat=2):
+        columns = _assigned(equal[row, other] + 0.5 * alike) if count > 1 else every[1]
+        for _ in range(2):
+            rows = _assigned(equal[:, :, every[1], columns].sum(axis=2))
+            columns = _assigned(equal[every[0], rows].sum(axis=0)) if count > 1 else columns
+        yield tuple(rows.tolist()), tuple(columns.tolist())
+
+
+def _assigned(score: Array) -> Array:
+    """Return which column each row is assigned to, by the largest sum; its own where it may be."""
+    size = len(score)
+    return np.asarray(linear_sum_assignment(score + np.eye(size) / (4 * size), maximize=True)[1])
 
 
 def _is_better(other: Laid, best: Laid) -> bool:

@@ -41,6 +41,7 @@ class Transmission(Protocol):
     name: str
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    twists: tuple[str, ...]
     units: dict[str, str]
     home: Any
 
@@ -89,7 +90,8 @@ class TransmissionReference(Reference):
         super().__init__(f.system)
         self.f = f
         parameters = [item.name for item in self.system.parameters]
-        self.own = tuple(parameters[: len(parameters) - len(f.inputs)])
+        count = len(parameters) - len(f.inputs) - len(f.signature.rates)
+        self.own = tuple(parameters[:count])
         self.forces = {f"tau_{name}": f"tau_{name}" for name in (*f.outputs, *f.inputs)}
         for letter, names in (("x", f.outputs), ("u", f.inputs)):
             for k, name in enumerate(names, 1):
@@ -110,12 +112,12 @@ class TransmissionReference(Reference):
 
     def names(self) -> tuple[tuple[str, str], ...]:
         """Return names that formulas use: inputs are numbered u1, u_1, outputs x1, x_1."""
-        ends = dict.fromkeys((*self.f.inputs, *self.f.outputs, *self.coordinates))
-        found = [(name, name) for name in ends]
+        found = dict.fromkeys((*self.f.inputs, *self.f.outputs, *self.coordinates))
+        pairs = [(name, name) for name in found]
         for letter, names in (("u", self.f.inputs), ("x", self.f.outputs), ("q", self.coordinates)):
             for number, name in enumerate(names, 1):
-                found += [(f"{letter}{number}", name), (f"{letter}_{number}", name)]
-        return tuple(found)
+                pairs += [(f"{letter}{number}", name), (f"{letter}_{number}", name)]
+        return tuple(pair for pair in pairs if pair[1] not in self.f.twists)
 
     def names_help(self) -> str:
         """Return in words which names formulas may use."""
@@ -214,9 +216,10 @@ class TransmissionReference(Reference):
                   "tau_u": generic(count, m), **given}  # fmt: skip
         u_dot = values["u_dot"]
         q_dot, x_dot = (np.einsum("kij,kj->ki", item, u_dot) for item in (poses.q_u, poses.J))
+        p = np.concatenate([p, np.zeros((count, len(self.f.signature.rates))), u], axis=-1)
         return PoseStates(
-            poses.q, q_dot, np.zeros(count), np.concatenate([p, u], axis=-1), group, u=u,
-            x=poses.x, x_dot=x_dot, poses=poses, **values,
+            poses.q, q_dot, np.zeros(count), p, group, u=u, x=poses.x, x_dot=x_dot, poses=poses,
+            **values,
         )  # fmt: skip
 
     def given_states(self, given: Mapping[str, ArrayLike]) -> PoseStates:
@@ -253,7 +256,8 @@ class TransmissionReference(Reference):
         """Return values by name: also of inputs and outputs, with rates and efforts."""
         assert isinstance(states, PoseStates)
         f, found = self.f, super()._inputs_at(states)
-        pairs = ((f.inputs, states.u, states.u_dot), (f.outputs, states.x, states.x_dot))
+        x = np.where(f.signature.is_twist, states.x_dot, states.x)  # a velocity is a rate itself
+        pairs = ((f.inputs, states.u, states.u_dot), (f.outputs, x, states.x_dot))
         for names, values, rates in pairs:
             for k, name in enumerate(names):
                 found.setdefault(name, values[:, k])
