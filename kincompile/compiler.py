@@ -165,13 +165,11 @@ def transmission_files(
     """
     from kincompile.emitters.transmission_emission import emit_transmission, require_transmission
     from kincompile.ir.transmission import transmission_code
+    from kincompile.transmissions.legs import without_legs
     from kincompile.transmissions.loop import loop_of
 
     require_transmission(target)
     loop = loop_of(system, inputs, outputs)
-    code = _lowered(loop.system, "inline")
-    assert isinstance(code, InlineProgram)
-    _require_small(code.program, "transmissions", "take")
     names = dict(zip(loop.parameters, loop.inputs, strict=True))
     q = _assembled(loop.system)
     if q is None:
@@ -179,8 +177,12 @@ def transmission_files(
             f"no position of {system.name} was found where a transmission begins, at the values "
             "that its drivers have at t = 0: give a better guess."
         )
-    drawn = [x.name for x in code.program.coordinates] if is_drawn else []
-    found = transmission_code(code, names, [*loop.outputs, *drawn], q.tolist())
+    wanted = [*loop.outputs, *(x.name for x in loop.system.coordinates if is_drawn)]
+    smaller, q = without_legs(loop.system, wanted, q)
+    code = _lowered(smaller, "inline")
+    assert isinstance(code, InlineProgram)
+    _require_small(code.program, "transmissions", "take")
+    found = transmission_code(code, names, wanted, q.tolist())
     defaults = {x.name: float(x.default or 0.0) for x in code.program.parameters}
     first = [q[k] for k in found.free], [defaults[name] for name in names]
     return emit_transmission(target, found, *first), found

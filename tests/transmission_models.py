@@ -27,7 +27,8 @@ def crank_rocker(a=0.04, b=0.12, c=0.08, d=0.13, *, psi=1.74, motor=1.5):
     return m
 
 
-def _foot(name):
+def foot_on_a_cross(name):
+    """Return a foot that turns about pitch and roll, which are its outputs."""
     m = spatial.Mechanism(name)
     foot = m.body("foot", (0, 0, 0))
     at, first, second = (0, 0, 0), (0, 1, 0), (1, 0, 0)
@@ -40,7 +41,7 @@ def _foot(name):
 
 def ankle():
     """Return T3-SPU: the actuators are distances."""
-    m, foot = _foot("ankle")
+    m, foot = foot_on_a_cross("ankle")
     for name, side in SIDES:
         ends = (-0.045, side * 0.036, 0.24), (-0.052, side * 0.034, 0.015)
         m.add(spatial.Distance(name, m.ground, ends[0], foot, ends[1], 0.2251))
@@ -49,7 +50,7 @@ def ankle():
 
 def ankle_with_rods():
     """Return T3-SPU with cylinders and rods as bodies, each pair of which may spin."""
-    m, foot = _foot("ankle_with_rods")
+    m, foot = foot_on_a_cross("ankle_with_rods")
     at, z = (0, 0, 0), (0, 0, 1)
     for name, side in SIDES:
         top, ball = (-0.045, side * 0.036, 0.24), (-0.052, side * 0.034, 0.015)

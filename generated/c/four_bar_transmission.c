@@ -3,7 +3,7 @@
 //
 // u     motor [rad]
 // x     phi_rocker [rad]
-// q     phi_coupler [rad], phi_rocker [rad]
+// q     phi_rocker [rad]
 // p     a [m], b [m], c [m], d [m], omega [rad/s]
 //
 // C99, no library but libm, no memory from the heap, nothing that is kept between calls:
@@ -19,7 +19,7 @@
 
 // Coordinates that are solved for, parameters, inputs, outputs, blocks of the planned solve.
 enum {
-    N = 2,
+    N = 1,
     K = 5,
     U = 1,
     X = 1,
@@ -45,7 +45,7 @@ enum {
 #define MAX_ITERATIONS 25
 #define MAX_SUBSTEPS 10000
 #define NOTHING NAN
-static const int ANGULAR[] = { 1, 1 };
+static const int ANGULAR[] = { 1 };
 static const int IS_ANGLE[] = { 1 };
 
 #ifdef __GNUC__
@@ -117,10 +117,10 @@ _always_inline double sine(double angle, int exact, int64_t *far)
 // A position, and what is computed there.
 typedef struct {
     double u[1];
-    double q[2];
-    double change[2];  // correction of Newton's method
+    double q[1];
+    double change[1];  // correction of Newton's method
     double determinants[1];
-    double slopes[2][1];
+    double slopes[1][1];
     double x[1];       // outputs
     double J[1][1];    // of x by u
     double missed[1];  // by what part of their terms equations are missed
@@ -131,45 +131,33 @@ _always_inline int64_t evaluate_at(const four_bar_state *s, pose *b, int exact)
 {
     (void)s, (void)exact;
     int64_t far = 0;
-    const double phi_coupler = b->q[0];
-    const double phi_rocker = b->q[1];
+    const double phi_rocker = b->q[0];
     const double a = s->p[0];
     const double b_ = s->p[1];
     const double c = s->p[2];
     const double d = s->p[3];
     const double u_motor = b->u[0];
     // body frames: A = [[c, -s], [s, c]]
-    double c_coupler, s_coupler;
-    far |= cos_sin(phi_coupler, exact, &c_coupler, &s_coupler);
     double c_rocker, s_rocker;
     far |= cos_sin(phi_rocker, exact, &c_rocker, &s_rocker);
     const double c_2 = c / 2.0;
     const double v_2 = c_2 * c_rocker;
-    const double v_3 = v_2 + v_2;
     const double a_2 = a / 2.0;
-    const double v_5 = a_2 * cosine(u_motor, exact, &far);
-    const double v_6 = v_5 + v_5;
-    const double b__2 = b_ / 2.0;
-    const double v_8 = b__2 * c_coupler;
-    const double v_9 = v_6 + v_8 + v_8 + v_2 + v_2 - d;
-    const double v_10 = c_2 * s_rocker;
-    const double v_11 = v_10 + v_10;
-    const double v_12 = a_2 * sine(u_motor, exact, &far);
-    const double v_13 = v_12 + v_12;
-    const double v_14 = b__2 * s_coupler;
-    const double v_15 = v_13 + v_14 + v_14 + v_10 + v_10;
-    const double v_16 = v_8 + v_8;
-    const double v_17 = v_14 + v_14;
-    const double determinants_0 = v_11 * v_16 - v_17 * v_3;
-    const double v_19 = 1.0 / determinants_0;
-    const double v_20 = (v_17 * v_15 + v_16 * v_9) * v_19;
-    const double slopes_1 = (v_17 * v_6 - v_16 * v_13) * v_19;
-    b->change[0] = (v_3 * v_9 + v_11 * v_15) * v_19;
-    b->change[1] = -v_20;
-    b->slopes[0][0] = (v_3 * v_13 - v_11 * v_6) * v_19;
-    b->slopes[1][0] = slopes_1;
-    b->x[0] = phi_rocker + v_20;
-    b->J[0][0] = slopes_1;
+    const double v_4 = a_2 * cosine(u_motor, exact, &far);
+    const double v_5 = v_2 - d + v_2 + v_4 + v_4;
+    const double v_6 = c_2 * s_rocker;
+    const double v_7 = a_2 * sine(u_motor, exact, &far);
+    const double v_8 = v_6 + v_6 + v_7 + v_7;
+    const double v_9 = 2.0 * v_5;
+    const double v_10 = 2.0 * v_8;
+    const double determinants_0 = 2.0 * (v_8 * v_2 - v_5 * v_6) - v_9 * v_6 + v_10 * v_2;
+    const double v_12 = 1.0 / determinants_0;
+    const double change_0 = (square(v_5) + square(v_8) - square(b_)) * v_12;
+    const double slopes_0 = (2.0 * (v_5 * v_7 - v_8 * v_4) + v_9 * v_7 - v_10 * v_4) * v_12;
+    b->change[0] = change_0;
+    b->slopes[0][0] = slopes_0;
+    b->x[0] = phi_rocker - change_0;
+    b->J[0][0] = slopes_0;
     b->determinants[0] = determinants_0;
     b->missed[0] = 0.0;
     return far;
@@ -184,37 +172,31 @@ static inline void evaluate(const four_bar_state *s, pose *b)
 // The same of several poses, side by side, so that a register takes as many as fit.
 static int64_t evaluate_strip(const four_bar_state *s, pose *b, int count)
 {
-    double given[3][LANES], found[8][LANES];
+    double given[2][LANES], found[6][LANES];
     int64_t far = 0;
     for (int lane = 0; lane < count; lane++) {
         given[0][lane] = b[lane].q[0];
-        given[1][lane] = b[lane].q[1];
-        given[2][lane] = b[lane].u[0];
+        given[1][lane] = b[lane].u[0];
     }
     for (int lane = 0; lane < count; lane++) {
         pose one;
         one.q[0] = given[0][lane];
-        one.q[1] = given[1][lane];
-        one.u[0] = given[2][lane];
+        one.u[0] = given[1][lane];
         far |= evaluate_at(s, &one, 0);
         found[0][lane] = one.change[0];
-        found[1][lane] = one.change[1];
-        found[2][lane] = one.slopes[0][0];
-        found[3][lane] = one.slopes[1][0];
-        found[4][lane] = one.x[0];
-        found[5][lane] = one.J[0][0];
-        found[6][lane] = one.determinants[0];
-        found[7][lane] = one.missed[0];
+        found[1][lane] = one.slopes[0][0];
+        found[2][lane] = one.x[0];
+        found[3][lane] = one.J[0][0];
+        found[4][lane] = one.determinants[0];
+        found[5][lane] = one.missed[0];
     }
     for (int lane = 0; lane < count; lane++) {
         b[lane].change[0] = found[0][lane];
-        b[lane].change[1] = found[1][lane];
-        b[lane].slopes[0][0] = found[2][lane];
-        b[lane].slopes[1][0] = found[3][lane];
-        b[lane].x[0] = found[4][lane];
-        b[lane].J[0][0] = found[5][lane];
-        b[lane].determinants[0] = found[6][lane];
-        b[lane].missed[0] = found[7][lane];
+        b[lane].slopes[0][0] = found[1][lane];
+        b[lane].x[0] = found[2][lane];
+        b[lane].J[0][0] = found[3][lane];
+        b[lane].determinants[0] = found[4][lane];
+        b[lane].missed[0] = found[5][lane];
     }
     return far;
 }
@@ -472,7 +454,7 @@ static const double START_U[] = {
     0.0,
 };
 static const double START_Q[] = {
-    0.5171520074493462, 3.9369914837739364,
+    3.9369914837739364,
 };
 
 int four_bar_begin(four_bar_state *s)
@@ -484,7 +466,7 @@ int four_bar_begin(four_bar_state *s)
 int four_bar_start(four_bar_state *s)
 {
     memset(s, 0, sizeof *s);
-    s->size = 12.969330787658691;
+    s->size = 6.785831928253174;
     memcpy(s->p, START_P, K * sizeof *s->p);
     memcpy(s->u, START_U, U * sizeof *s->u);
     memcpy(s->q, START_Q, N * sizeof *s->q);

@@ -3,7 +3,7 @@
 //
 // u     motor [rad]
 // x     phi_rocker [rad]
-// q     phi_coupler [rad], phi_rocker [rad]
+// q     phi_rocker [rad]
 // p     a [m], b [m], c [m], d [m], omega [rad/s]
 
 #ifndef FOUR_BAR_TRANSMISSION_H
@@ -31,13 +31,13 @@ typedef struct {
     double size;          // of the mechanism, by which lengths are judged
     double p[5];
     double u[1];          // inputs
-    double q[2];          // coordinates that several equations together determine
+    double q[1];          // coordinates that several equations together determine
     double determinants[1];
-    double slopes[2][1];  // of q by u
+    double slopes[1][1];  // of q by u
     double way[1];        // by what u changed last
-    double bend[2];       // second order of q along that way
-    double twist[2];      // third order
-    double turned[2][1];  // by what the slopes changed on it
+    double bend[1];       // second order of q along that way
+    double twist[1];      // third order
+    double turned[1][1];  // by what the slopes changed on it
 } four_bar_state;
 
 // Begin at the position of the model. Returns what became of it.

@@ -3,7 +3,7 @@
 //
 // u     motor [rad]
 // x     phi_rocker [rad]
-// q     phi_coupler [rad], phi_rocker [rad]
+// q     phi_rocker [rad]
 // p     a [m], b [m], c [m], d [m], omega [rad/s]
 //
 // A classic script of a page: it declares four_bar_transmission. Under node, require() returns the same.
@@ -22,7 +22,7 @@ const four_bar_transmission = (() => {
         "phi_rocker",
     ];
     const COORDINATES = [
-        "phi_coupler", "phi_rocker",
+        "phi_rocker",
     ];
     const PARAMETERS = [
         "a", "b", "c", "d", "omega",
@@ -31,24 +31,26 @@ const four_bar_transmission = (() => {
         10.0, 26.0, 18.0, 20.0, 1.5,
     ];
     const Q = [
-        0.5171520074493462, 3.9369914837739364,
+        3.9369914837739364,
     ];
     const U_START = [
         0.0,
     ];
-    const SIZE = 12.969330787658691;  // of the mechanism, by which lengths are judged
+    const SIZE = 6.785831928253174;  // of the mechanism, by which lengths are judged
 
     // Coordinates that are solved for, parameters, inputs, outputs, blocks of the planned solve; what
     // became of a call; by what a position is judged; which coordinates and inputs are angles.
-    const N = 2, K = 5, U = 1, X = 1, BLOCKS = 1, ONE = 1, CONVERGED = 0, NOT_CONVERGED = 1,
+    const N = 1, K = 5, U = 1, X = 1, BLOCKS = 1, ONE = 1, CONVERGED = 0, NOT_CONVERGED = 1,
         SINGULAR = 2, NOT_FINITE = 3, NOT_REACHED = 4, KINK = 8.0, LARGE_ERROR = 0.5,
         LAST_CORRECTION = 1e-11, LONGEST_PART = 4.0, NEARLY_SINGULAR = 30.0,
         NEAR_ANGLE = 0.5235987755982988, SMALLEST_PART = 9.5367431640625e-07, SMALL_ERROR = 0.05,
         SMOOTH = 1e-09, SOLVED = 1e-10, STEEPEST = 10000.0, MAX_CORRECTIONS = 6,
         MAX_ITERATIONS = 25, MAX_SUBSTEPS = 10000;
-    const ANGULAR = [true, true];
+    const ANGULAR = [true];
     const IS_ANGLE = [true];
     const NOTHING = NaN;
+
+    const square = x => x * x;
 
     const zeros = (rows, columns) => Array.from({ length: rows }, () => new Float64Array(columns));
 
@@ -61,45 +63,33 @@ const four_bar_transmission = (() => {
 
     // Correction, slopes, outputs and their Jacobian at a pose.
     function evaluate_at(s, b) {
-        const phi_coupler = b.q[0];
-        const phi_rocker = b.q[1];
+        const phi_rocker = b.q[0];
         const a = s.p[0];
         const b_ = s.p[1];
         const c = s.p[2];
         const d = s.p[3];
         const u_motor = b.u[0];
         // body frames: A = [[c, -s], [s, c]]
-        const c_coupler = Math.cos(phi_coupler);
-        const s_coupler = Math.sin(phi_coupler);
         const c_rocker = Math.cos(phi_rocker);
         const s_rocker = Math.sin(phi_rocker);
         const c_2 = c / 2;
         const v_2 = c_2 * c_rocker;
-        const v_3 = v_2 + v_2;
         const a_2 = a / 2;
-        const v_5 = a_2 * Math.cos(u_motor);
-        const v_6 = v_5 + v_5;
-        const b__2 = b_ / 2;
-        const v_8 = b__2 * c_coupler;
-        const v_9 = v_6 + v_8 + v_8 + v_2 + v_2 - d;
-        const v_10 = c_2 * s_rocker;
-        const v_11 = v_10 + v_10;
-        const v_12 = a_2 * Math.sin(u_motor);
-        const v_13 = v_12 + v_12;
-        const v_14 = b__2 * s_coupler;
-        const v_15 = v_13 + v_14 + v_14 + v_10 + v_10;
-        const v_16 = v_8 + v_8;
-        const v_17 = v_14 + v_14;
-        const determinants_0 = v_11 * v_16 - v_17 * v_3;
-        const v_19 = 1 / determinants_0;
-        const v_20 = (v_17 * v_15 + v_16 * v_9) * v_19;
-        const slopes_1 = (v_17 * v_6 - v_16 * v_13) * v_19;
-        b.change[0] = (v_3 * v_9 + v_11 * v_15) * v_19;
-        b.change[1] = -v_20;
-        b.slopes[0][0] = (v_3 * v_13 - v_11 * v_6) * v_19;
-        b.slopes[1][0] = slopes_1;
-        b.x[0] = phi_rocker + v_20;
-        b.J[0][0] = slopes_1;
+        const v_4 = a_2 * Math.cos(u_motor);
+        const v_5 = v_2 - d + v_2 + v_4 + v_4;
+        const v_6 = c_2 * s_rocker;
+        const v_7 = a_2 * Math.sin(u_motor);
+        const v_8 = v_6 + v_6 + v_7 + v_7;
+        const v_9 = 2 * v_5;
+        const v_10 = 2 * v_8;
+        const determinants_0 = 2 * (v_8 * v_2 - v_5 * v_6) - v_9 * v_6 + v_10 * v_2;
+        const v_12 = 1 / determinants_0;
+        const change_0 = (square(v_5) + square(v_8) - square(b_)) * v_12;
+        const slopes_0 = (2 * (v_5 * v_7 - v_8 * v_4) + v_9 * v_7 - v_10 * v_4) * v_12;
+        b.change[0] = change_0;
+        b.slopes[0][0] = slopes_0;
+        b.x[0] = phi_rocker - change_0;
+        b.J[0][0] = slopes_0;
         b.determinants[0] = determinants_0;
         b.missed[0] = 0;
     }

@@ -3,7 +3,7 @@ do not edit.
 
 u     motor [rad]
 x     phi_rocker [rad]
-q     phi_coupler [rad], phi_rocker [rad]
+q     phi_rocker [rad]
 p     a [m], b [m], c [m], d [m], omega [rad/s]
 
     state, status = start()
@@ -19,13 +19,13 @@ import numpy as np
 
 INPUTS = ("motor",)
 OUTPUTS = ("phi_rocker",)
-COORDINATES = ("phi_coupler", "phi_rocker")
+COORDINATES = ("phi_rocker",)
 PARAMETERS = ("a", "b", "c", "d", "omega")
 # a position of the model: parameters, inputs and coordinates
 P = (10.0, 26.0, 18.0, 20.0, 1.5)
 U = (0.0,)
-Q = (0.5171520074493462, 3.9369914837739364)
-SIZE = 12.969330787658691  # of the mechanism, by which lengths are judged
+Q = (3.9369914837739364,)
+SIZE = 6.785831928253174  # of the mechanism, by which lengths are judged
 
 # What became of a call: a position was found; none near the guess, or the prediction; it is
 # singular, or such a position lies between the last one and the inputs; a number is not finite; the
@@ -76,33 +76,27 @@ def _numbers(name, values, names):
 
 
 def _code(f, p, u, q):
-    phi_coupler = q[0]
-    phi_rocker = q[1]
+    phi_rocker = q[0]
     a = p[0]
     b = p[1]
     c = p[2]
     d = p[3]
     u_motor = u[0]
     cos, cos_sin, sin = f.cos, f.cos_sin, f.sin
-    c_coupler, s_coupler = cos_sin(phi_coupler)
     c_rocker, s_rocker = cos_sin(phi_rocker)
     c_2 = c / 2
-    v_2 = c_2 * c_rocker
-    v_3, a_2 = v_2 + v_2, a / 2
-    v_5 = a_2 * cos(u_motor)
-    v_6, b_2 = v_5 + v_5, b / 2
-    v_8 = b_2 * c_coupler
-    v_9, v_10 = v_6 + v_8 + v_8 + v_2 + v_2 - d, c_2 * s_rocker
-    v_11, v_12 = v_10 + v_10, a_2 * sin(u_motor)
-    v_13, v_14 = v_12 + v_12, b_2 * s_coupler
-    v_15, v_16 = v_13 + v_14 + v_14 + v_10 + v_10, v_8 + v_8
-    v_17 = v_14 + v_14
-    determinants_0 = v_11 * v_16 - v_17 * v_3
-    v_19 = 1 / determinants_0
-    v_20, slopes_1 = (v_17 * v_15 + v_16 * v_9) * v_19, (v_17 * v_6 - v_16 * v_13) * v_19
+    v_2, a_2 = c_2 * c_rocker, a / 2
+    v_4 = a_2 * cos(u_motor)
+    v_5, v_6 = v_2 - d + v_2 + v_4 + v_4, c_2 * s_rocker
+    v_7 = a_2 * sin(u_motor)
+    v_8, v_9 = v_6 + v_6 + v_7 + v_7, 2 * v_5
+    v_10 = 2 * v_8
+    determinants_0 = 2 * (v_8 * v_2 - v_5 * v_6) - v_9 * v_6 + v_10 * v_2
+    v_12 = 1 / determinants_0
+    change_0 = (v_5**2 + v_8**2 - b**2) * v_12
+    slopes_0 = (2 * (v_5 * v_7 - v_8 * v_4) + v_9 * v_7 - v_10 * v_4) * v_12
     return (
-        (v_3 * v_9 + v_11 * v_15) * v_19, -v_20, (v_3 * v_13 - v_11 * v_6) * v_19, slopes_1,
-        phi_rocker + v_20, slopes_1, determinants_0, 0,
+        change_0, slopes_0, phi_rocker - change_0, slopes_0, determinants_0, 0,
     )
 
 
@@ -152,13 +146,13 @@ def _ratio(a, b):
 # ---- the solver: alike in all modules but for sizes and two tables. N coordinates, K parameters,
 # U inputs, X outputs, blocks of the planned solve; which coordinates and inputs are angles; by what
 # a position is judged.
-_N = 2
+_N = 1
 _K = 5
 _U = 1
 _X = 1
 _BLOCKS = 1
 _ONE = 1
-_ANGULAR = (True, True)
+_ANGULAR = (True,)
 _IS_ANGLE = (True,)
 _KINK = 8.0
 _LARGE_ERROR = 0.5

@@ -4,7 +4,7 @@ function [s, x, J, status] = four_bar_transmission(s, u, q, p)
 %
 % u     motor [rad]
 % x     phi_rocker [rad]
-% q     phi_coupler [rad], phi_rocker [rad]
+% q     phi_rocker [rad]
 % p     a [m], b [m], c [m], d [m], omega [rad/s]
 %
 %     s = four_bar_transmission();                       begins at the position of the model
@@ -19,12 +19,12 @@ if nargin > 0 && ~isempty(s)
     [s, b, status] = transmit(s, u(:), new_pose());
 else
     s = new_transmission();
-    s.size = 12.969330787658691;
-    s.ANGULAR = [true; true];
+    s.size = 6.785831928253174;
+    s.ANGULAR = [true];
     s.IS_ANGLE = [true];
     s.p = [10.0; 26.0; 18.0; 20.0; 1.5];
     s.u = [0.0];
-    s.q = [0.5171520074493462; 3.9369914837739364];
+    s.q = [3.9369914837739364];
     if nargin > 1
         s.u = u(:);
         s.q = q(:);
@@ -40,52 +40,40 @@ end
 
 function b = evaluate(s, b)
 % Correction, slopes, outputs and their Jacobian at a pose.
-phi_coupler = b.q(1);
-phi_rocker = b.q(2);
+phi_rocker = b.q(1);
 a = s.p(1);
 b_ = s.p(2);
 c = s.p(3);
 d = s.p(4);
 u_motor = b.u(1);
 % body frames: A = [c, -s; s, c]
-c_coupler = cos(phi_coupler);
-s_coupler = sin(phi_coupler);
 c_rocker = cos(phi_rocker);
 s_rocker = sin(phi_rocker);
 c_2 = c / 2;
 v_2 = c_2 * c_rocker;
-v_3 = v_2 + v_2;
 a_2 = a / 2;
-v_5 = a_2 * cos(u_motor);
-v_6 = v_5 + v_5;
-b__2 = b_ / 2;
-v_8 = b__2 * c_coupler;
-v_9 = v_6 + v_8 + v_8 + v_2 + v_2 - d;
-v_10 = c_2 * s_rocker;
-v_11 = v_10 + v_10;
-v_12 = a_2 * sin(u_motor);
-v_13 = v_12 + v_12;
-v_14 = b__2 * s_coupler;
-v_15 = v_13 + v_14 + v_14 + v_10 + v_10;
-v_16 = v_8 + v_8;
-v_17 = v_14 + v_14;
-determinants_0 = v_11 * v_16 - v_17 * v_3;
-v_19 = 1 / determinants_0;
-v_20 = (v_17 * v_15 + v_16 * v_9) * v_19;
-slopes_1 = (v_17 * v_6 - v_16 * v_13) * v_19;
-b.change(1) = (v_3 * v_9 + v_11 * v_15) * v_19;
-b.change(2) = -v_20;
-b.slopes(1, 1) = (v_3 * v_13 - v_11 * v_6) * v_19;
-b.slopes(2, 1) = slopes_1;
-b.x(1) = phi_rocker + v_20;
-b.J(1, 1) = slopes_1;
+v_4 = a_2 * cos(u_motor);
+v_5 = v_2 - d + v_2 + v_4 + v_4;
+v_6 = c_2 * s_rocker;
+v_7 = a_2 * sin(u_motor);
+v_8 = v_6 + v_6 + v_7 + v_7;
+v_9 = 2 * v_5;
+v_10 = 2 * v_8;
+determinants_0 = 2 * (v_8 * v_2 - v_5 * v_6) - v_9 * v_6 + v_10 * v_2;
+v_12 = 1 / determinants_0;
+change_0 = (v_5^2 + v_8^2 - b_^2) * v_12;
+slopes_0 = (2 * (v_5 * v_7 - v_8 * v_4) + v_9 * v_7 - v_10 * v_4) * v_12;
+b.change(1) = change_0;
+b.slopes(1, 1) = slopes_0;
+b.x(1) = phi_rocker - change_0;
+b.J(1, 1) = slopes_0;
 b.determinants(1) = determinants_0;
 b.missed(1) = 0;
 end
 
 function made = new_transmission()
 % A position of a mechanism, from which it goes on, and how it came there.
-K = 5; U = 1; N = 2; BLOCKS = 1;
+K = 5; U = 1; N = 1; BLOCKS = 1;
 made.size = 0;  % of the mechanism, by which lengths are judged
 made.p = zeros(K, 1);
 made.u = zeros(U, 1);  % inputs
@@ -100,7 +88,7 @@ end
 
 function made = new_pose()
 % A position, and what is computed there.
-U = 1; N = 2; BLOCKS = 1; X = 1; ONE = 1;
+U = 1; N = 1; BLOCKS = 1; X = 1; ONE = 1;
 made.u = zeros(U, 1);
 made.q = zeros(N, 1);
 made.change = zeros(N, 1);  % correction of Newton's method
@@ -113,7 +101,7 @@ end
 
 function b = predict(s, u, b)
 % Predict the position for inputs: along the last way to third order, across it to first.
-U = 1; LONGEST_PART = 4.0; N = 2;
+U = 1; LONGEST_PART = 4.0; N = 1;
 step = zeros(U, 1);
 across = zeros(U, 1);
 along = 0.0;
@@ -138,7 +126,7 @@ end
 
 function [b, answer] = correct(s, b)
 % Take the correction of a position; return how large it is, in scales.
-N = 2;
+N = 1;
 inverse = 1.0 / s.size;
 size = 0.0;
 for i = 1:N
@@ -187,7 +175,7 @@ end
 
 function answer = steepness(s, b)
 % Return the largest slope, in scales of coordinates and inputs.
-N = 2; U = 1;
+N = 1; U = 1;
 inverse = 1.0 / s.size;
 most = 0.0;
 for i = 1:N
@@ -213,7 +201,7 @@ end
 
 function answer = bends(s, b)
 % Say whether a position is on another branch, which begins on the way from the last one.
-N = 2; U = 1; KINK = 8.0; SMOOTH = 1e-09;
+N = 1; U = 1; KINK = 8.0; SMOOTH = 1e-09;
 error = 0.0;
 kink = 0.0;
 for i = 1:N
@@ -238,7 +226,7 @@ end
 function [b, answer] = sets_out(s, u, b)
 % Predict the position for inputs; return whether it is near enough to be corrected. A prediction
 % that is far away proves nothing, since angles may turn to any assembly.
-N = 2; NOT_FINITE = 3; NOT_CONVERGED = 1; CONVERGED = 0; LARGE_ERROR = 0.5;
+N = 1; NOT_FINITE = 3; NOT_CONVERGED = 1; CONVERGED = 0; LARGE_ERROR = 0.5;
 b = predict(s, u, b);
 inverse = 1.0 / s.size;
 moved = 0.0;
@@ -296,7 +284,7 @@ end
 
 function s = accept(s, b)
 % Take a position as the last one, with the way to it unless it is the same.
-U = 1; N = 2;
+U = 1; N = 1;
 moves = false;
 way = zeros(U, 1);
 way = b.u - s.u;
@@ -403,7 +391,7 @@ end
 function [s, b, answer] = begin(s, u, q, b)
 % Find the position near a guess, from which to go on; return what became of it.
 MAX_ITERATIONS = 25; NEAR_ANGLE = 0.5235987755982988; CONVERGED = 0; STEEPEST = 10000.0;
-SINGULAR = 2; U = 1; N = 2;
+SINGULAR = 2; U = 1; N = 1;
 b.u = u;
 b.q = q;
 [b, status] = settle(s, MAX_ITERATIONS, NEAR_ANGLE, b);

@@ -3,7 +3,7 @@
 //!
 //! u     motor [rad]
 //! x     phi_rocker [rad]
-//! q     phi_coupler [rad], phi_rocker [rad]
+//! q     phi_rocker [rad]
 //! p     a [m], b [m], c [m], d [m], omega [rad/s]
 //!
 //! A module without a dependency: put the file beside your own and write `mod four_bar_transmission;`.
@@ -15,7 +15,7 @@
 #![allow(unused_parens, unused_variables, unused_mut, unused_comparisons, unused_assignments)]
 
 /// Coordinates that are solved for, parameters, inputs, outputs, blocks of the planned solve.
-pub const N_COORDINATES: usize = 2;
+pub const N_COORDINATES: usize = 1;
 pub const N_PARAMETERS: usize = 5;
 pub const U: usize = 1;
 pub const X: usize = 1;
@@ -23,14 +23,14 @@ pub const BLOCKS: usize = 1;
 pub const ONE: usize = 1;
 pub const INPUTS: [&str; 1] = ["motor"];
 pub const OUTPUTS: [&str; 1] = ["phi_rocker"];
-pub const COORDINATES: [&str; 2] = ["phi_coupler", "phi_rocker"];
+pub const COORDINATES: [&str; 1] = ["phi_rocker"];
 pub const PARAMETERS: [&str; 5] = ["a", "b", "c", "d", "omega"];
 /// A position of the model: parameters, inputs and coordinates.
 pub const P: [f64; N_PARAMETERS] = [10.0, 26.0, 18.0, 20.0, 1.5];
 pub const START_U: [f64; U] = [0.0];
-pub const Q: [f64; N_COORDINATES] = [0.5171520074493462, 3.9369914837739364];
+pub const Q: [f64; N_COORDINATES] = [3.9369914837739364];
 /// Of the mechanism, by which lengths are judged.
-pub const SIZE: f64 = 12.969330787658691;
+pub const SIZE: f64 = 6.785831928253174;
 
 // By what a position is judged; what became of a call; which coordinates and inputs are angles.
 const KINK: f64 = 8.0;
@@ -52,7 +52,7 @@ pub const NOT_CONVERGED: usize = 1;
 pub const SINGULAR: usize = 2;
 pub const NOT_FINITE: usize = 3;
 pub const NOT_REACHED: usize = 4;
-const ANGULAR: [bool; 2] = [true, true];
+const ANGULAR: [bool; 1] = [true];
 const IS_ANGLE: [bool; 1] = [true];
 const NOTHING: f64 = f64::NAN;
 
@@ -85,47 +85,39 @@ pub fn effort(J: &[[f64; U]; X], tau_x: &[f64; X]) -> [f64; U] {
     tau_u
 }
 
+fn square(x: f64) -> f64 {
+    x * x
+}
+
 // Correction, slopes, outputs and their Jacobian at a pose.
 fn evaluate(s: &Transmission, b: &mut Pose) {
-    let phi_coupler = b.q[0];
-    let phi_rocker = b.q[1];
+    let phi_rocker = b.q[0];
     let a = s.p[0];
     let b_ = s.p[1];
     let c = s.p[2];
     let d = s.p[3];
     let u_motor = b.u[0];
     // body frames: A = [[c, -s], [s, c]]
-    let c_coupler = f64::cos(phi_coupler);
-    let s_coupler = f64::sin(phi_coupler);
     let c_rocker = f64::cos(phi_rocker);
     let s_rocker = f64::sin(phi_rocker);
     let c_2 = c / 2.0;
     let v_2 = c_2 * c_rocker;
-    let v_3 = v_2 + v_2;
     let a_2 = a / 2.0;
-    let v_5 = a_2 * f64::cos(u_motor);
-    let v_6 = v_5 + v_5;
-    let b__2 = b_ / 2.0;
-    let v_8 = b__2 * c_coupler;
-    let v_9 = v_6 + v_8 + v_8 + v_2 + v_2 - d;
-    let v_10 = c_2 * s_rocker;
-    let v_11 = v_10 + v_10;
-    let v_12 = a_2 * f64::sin(u_motor);
-    let v_13 = v_12 + v_12;
-    let v_14 = b__2 * s_coupler;
-    let v_15 = v_13 + v_14 + v_14 + v_10 + v_10;
-    let v_16 = v_8 + v_8;
-    let v_17 = v_14 + v_14;
-    let determinants_0 = v_11 * v_16 - v_17 * v_3;
-    let v_19 = 1.0 / determinants_0;
-    let v_20 = (v_17 * v_15 + v_16 * v_9) * v_19;
-    let slopes_1 = (v_17 * v_6 - v_16 * v_13) * v_19;
-    b.change[0] = (v_3 * v_9 + v_11 * v_15) * v_19;
-    b.change[1] = -v_20;
-    b.slopes[0][0] = (v_3 * v_13 - v_11 * v_6) * v_19;
-    b.slopes[1][0] = slopes_1;
-    b.x[0] = phi_rocker + v_20;
-    b.J[0][0] = slopes_1;
+    let v_4 = a_2 * f64::cos(u_motor);
+    let v_5 = v_2 - d + v_2 + v_4 + v_4;
+    let v_6 = c_2 * s_rocker;
+    let v_7 = a_2 * f64::sin(u_motor);
+    let v_8 = v_6 + v_6 + v_7 + v_7;
+    let v_9 = 2.0 * v_5;
+    let v_10 = 2.0 * v_8;
+    let determinants_0 = 2.0 * (v_8 * v_2 - v_5 * v_6) - v_9 * v_6 + v_10 * v_2;
+    let v_12 = 1.0 / determinants_0;
+    let change_0 = (square(v_5) + square(v_8) - square(b_)) * v_12;
+    let slopes_0 = (2.0 * (v_5 * v_7 - v_8 * v_4) + v_9 * v_7 - v_10 * v_4) * v_12;
+    b.change[0] = change_0;
+    b.slopes[0][0] = slopes_0;
+    b.x[0] = phi_rocker - change_0;
+    b.J[0][0] = slopes_0;
     b.determinants[0] = determinants_0;
     b.missed[0] = 0.0;
 }

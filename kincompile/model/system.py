@@ -47,7 +47,7 @@ from kincompile.model.scope import Scope
 from kincompile.model.text_views import TextViews
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
     from types import ModuleType
 
     from kincompile.model.constraint import Constraint, Element
@@ -230,6 +230,20 @@ class ConstraintSystem(MatrixViews, TextViews):
         changed = {
             "constraints": found, "equations": names, "parameters": every, "loads": (),
             "observers": (*self.observers, *seen),
+        }  # fmt: skip
+        return self._with(changed)
+
+    def without(
+        self, bodies: Collection[str], observers: Sequence[PlacedPoint | ResolvedOutput]
+    ) -> ConstraintSystem:
+        """Return the system without bodies that nothing in it names, with these outputs alone."""
+        left = tuple(body for body in self.bodies if body.name not in bodies)
+        gone = {x for body in self.bodies if body not in left for x in body.coordinates}
+        names = {item.name for item in observers}
+        changed = {
+            "bodies": left, "observers": tuple(observers),
+            "coordinates": tuple(x for x in self.coordinates if x.name not in gone),
+            "body_points": tuple(x for x in self.body_points if x.name in names),
         }  # fmt: skip
         return self._with(changed)
 

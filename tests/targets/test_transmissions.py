@@ -134,23 +134,21 @@ def test_a_singular_position_is_left_again_on_the_same_branch(target, tmp_path, 
 
 def test_a_wrong_start_says_so(run):
     pose = GOLDEN["T1a"]["poses"][1]
-    open_ = [0.3303551689845515, pose["x"][0]]
-    crossed = [-1.0, GOLDEN["T1a"]["assemblies"]["x"][1][0]]
-    _, *found = run("T1a", [start(), start([1.5], open_), start([1.5], [3.4, 4.0]), go(1.6)], [1.0])
+    crossed = GOLDEN["T1a"]["assemblies"]["x"][1]
+    _, *found = run("T1a", [start(), start([1.5], pose["x"]), start([1.5], [2.9]), go(1.6)], [1.0])
     assert found[0] == CONVERGED
     assert found[1] == NOT_CONVERGED
     began, here = run("T1a", [start([1.5], crossed), go(1.5)], [1.0])
     assert began == CONVERGED
-    np.testing.assert_allclose(here.x, crossed[1], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(here.x, crossed, rtol=0, atol=1e-13)
 
 
 def test_parameters_are_the_callers(run):
     """T1b is the crank-rocker with other lengths."""
     p = [GOLDEN["T1b"]["parameters"][x] for x in "abcd"]
     pose, other = GOLDEN["T1b"]["poses"][1:3]
-    coupler = p[3] + p[2] * np.exp(1j * pose["x"][0]) - p[0] * np.exp(1j * pose["u"][0])
-    q = [float(np.angle(coupler)), pose["x"][0]]
-    began, here = run("T1a", [start(pose["u"], q, p), go(*other["u"])], other["tau_x"])
+    calls = [start(pose["u"], pose["x"], p), go(*other["u"])]
+    began, here = run("T1a", calls, other["tau_x"])
     assert began == CONVERGED
     np.testing.assert_allclose(here.x, other["x"], rtol=0, atol=1e-13)
     np.testing.assert_allclose(here.J, other["J"], rtol=1e-10)

@@ -1,0 +1,160 @@
+"""Legs that no output sees: left out of emitted transmissions, which give what all bodies give.
+
+Beside the table of 60 digits, closed forms, and `kc.transmission`, which solves for all bodies.
+"""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kincompile as kc
+from kincompile import spatial
+from tests import transmission_models as models
+
+GOLDEN = json.loads((Path(__file__).parents[2] / "data" / "transmission_golden.json").read_text())
+ANKLE = ["left", "right"], ["pitch", "roll"]
+FOOT = [f"e{k}_foot" for k in range(4)]
+AT = (0, 0, 0)
+
+
+def emitted(model, ends):
+    """Return the emitted module."""
+    module: dict[str, Any] = {}
+    exec(kc.emit(model, transmission=ends).source, module)
+    return module
+
+
+def poses(module, path):
+    """Yield x and J along a path."""
+    state, status = module["start"]()
+    assert status == 0
+    for u in path:
+        x, slopes, status = module["transmission"](state, u)
+        assert status == 0
+        yield np.array(x), np.array(slopes)
+
+
+def is_ankle(module, *, off=0.0, beyond=0.0):
+    """Check that a module is T3-SPU by strokes, whose balls are so far off and beyond them."""
+    assert list(module["COORDINATES"]) == FOOT
+    table = GOLDEN["T3-SPU"]["poses"]
+    rods = np.array([pose["u"] for pose in table])
+    strokes = np.sqrt(rods**2 - off**2)
+    found = poses(module, strokes + beyond)
+    for pose, rod, stroke, (x, slopes) in zip(table, rods, strokes, found, strict=True):
+        np.testing.assert_allclose(x, pose["x"], rtol=0, atol=1e-12)
+        wanted = pose["J"] * (stroke / rod)
+        np.testing.assert_allclose(slopes, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())
+
+
+def ankle(joint, end=spatial.Spherical, *, along=(0, 0, -1), off=0.0, beyond=0.0, hung=0.0):
+    """Return T3-SPU on cylinders in universal joints, and rods.
+
+    Of a rod the slide ends `beyond` its ball, which is `off` the axis; the cylinder is `hung` so
+    far beside its axis.
+    """
+    m, foot = models.foot_on_a_cross("legs")
+    aside = np.array((-along[2], 0, along[0]))
+    for name, side in models.SIDES:
+        top, ball = (-0.045, side * 0.036, 0.24), (-0.052, side * 0.034, 0.015)
+        cylinder, rod = m.body(f"cylinder_{name}", top), m.body(f"rod_{name}", ball)
+        given = m.ground, top, (0, 1, 0), cylinder, hung * aside, aside
+        m.add(spatial.Universal(f"top_{name}", *given))
+        to = off * aside - beyond * np.array(along)
+        if end is spatial.Universal:
+            m.add(end(f"ball_{name}", foot, ball, (1, 0, 0), rod, to, (0, 1, 0)))
+        else:
+            m.add(end(f"ball_{name}", foot, ball, rod, to))
+        if joint is spatial.Translational:
+            across = np.cross(along, aside)
+            m.add(joint(f"slide_{name}", cylinder, AT, along, aside, rod, AT, along, across))
+        else:
+            m.add(joint(f"slide_{name}", cylinder, AT, along, rod, AT, along))
+        m.add(spatial.RelativeTranslation(name, cylinder, AT, along, rod, AT, 0.225 + beyond))
+    return m
+
+
+def test_rods_between_balls_are_left_out():
+    module = emitted(models.ankle_with_rods(), ANKLE)
+    assert list(module["COORDINATES"]) == FOOT
+    path = [[-length for length in pose["u"]] for pose in GOLDEN["T3-SPU"]["poses"]]
+    for pose, (x, slopes) in zip(GOLDEN["T3-SPU"]["poses"], poses(module, path), strict=True):
+        np.testing.assert_allclose(x, pose["x"], rtol=0, atol=1e-13)
+        np.testing.assert_allclose(-slopes, pose["J"], rtol=1e-9, atol=1e-11)
+
+
+def test_a_rod_may_turn_in_its_cylinder_and_end_beyond_its_ball():
+    is_ankle(emitted(ankle(spatial.Cylindrical, beyond=0.1), ANKLE), beyond=0.1)
+
+
+def test_a_ball_beside_the_axis_is_at_a_distance_of_both_and_any_axis_will_do():
+    turned = ankle(spatial.Translational, along=(0.6, 0, -0.8), off=0.02)
+    is_ankle(emitted(turned, ANKLE), off=0.02)
+
+
+def test_links_between_hinges_are_distances():
+    module = emitted(models.crank_rocker(), (["motor"], ["rocker.phi"]))
+    assert module["COORDINATES"] == ("phi_rocker",)
+    module = emitted(models.five_bar(), (["motor_1", "motor_2"], ["end"]))
+    assert module["COORDINATES"] == ("phi_rod_1",)
+    table = GOLDEN["T6"]["poses"][:2]
+    for pose, (x, slopes) in zip(table, poses(module, [x["u"] for x in table]), strict=True):
+        np.testing.assert_allclose(x, pose["x"], rtol=0, atol=1e-13)
+        np.testing.assert_allclose(slopes, pose["J"], rtol=1e-9, atol=1e-11)
+
+
+def test_lengths_stay_parameters():
+    """T1b by the parameters of T1a."""
+    module = emitted(models.crank_rocker(), (["motor"], ["rocker.phi"]))
+    p = [GOLDEN["T1b"]["parameters"][x] for x in "abcd"]
+    one, other = GOLDEN["T1b"]["poses"][1:3]
+    state, status = module["start"](p, one["u"], one["x"])
+    assert status == 0
+    x, slopes, _ = module["transmission"](state, other["u"])
+    np.testing.assert_allclose(x, other["x"], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(slopes, other["J"], rtol=1e-10)
+
+
+def test_a_cylinder_in_the_plane_is_the_law_of_cosines():
+    m = kc.Mechanism("lift")
+    offset = m.parameter("offset", 0.1, "m")
+    places = ("arm", (0, 0, 1.0)), ("cylinder", (0.4, 0, 2.2)), ("rod", (0.3, 0.2, 2.2))
+    arm, cylinder, rod = (m.body(*x) for x in places)
+    m.add(kc.Revolute("O", m.ground, (0, 0), arm, (0, 0)))
+    m.add(kc.Revolute("A", m.ground, (0.4, 0), cylinder, (0, 0)))
+    slide = cylinder, (0, 0), (1, 0), rod, (0, 0)
+    m.add(kc.Translational("slide", *slide, (1, 0)))
+    m.add(kc.TranslationalDistance("stroke", *slide, 0.2))
+    m.add(kc.Revolute("B", arm, (0.3, 0), rod, (offset, 0)))
+    module = emitted(m, (["stroke"], ["phi_arm"]))
+    assert module["COORDINATES"] == ("phi_arm",)
+    strokes = np.linspace(0.1, 0.5, 9)
+    for stroke, (x, _) in zip(strokes, poses(module, strokes[:, np.newaxis]), strict=True):
+        cosine = (0.3**2 + 0.4**2 - (stroke + 0.1) ** 2) / (2 * 0.3 * 0.4)
+        assert abs(x[0] - math.acos(cosine)) < 1e-12
+
+
+@pytest.mark.slow
+def test_a_rod_whose_turn_counts_stays():
+    """Both ends are beside the axis about which universal joints turn the rod."""
+    m = ankle(spatial.Cylindrical, spatial.Universal, off=0.02, hung=0.03)
+    module = emitted(m, ANKLE)
+    assert set(FOOT) < set(module["COORDINATES"])
+    f = kc.transmission(m, *ANKLE)
+    path = f.home.u + np.array([[0.0, 0.0], [0.004, -0.003], [0.008, 0.002]])
+    wanted = f.at(path)
+    assert wanted.success
+    for x, slopes, found in zip(wanted.x, wanted.J, poses(module, path), strict=True):
+        np.testing.assert_allclose(found[0], x, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(found[1], slopes, rtol=0, atol=1e-7 * np.abs(slopes).max())
+
+
+def test_what_an_output_sees_stays():
+    ends = ["left", "right"], ["pitch", "rod_left.x"]
+    found = emitted(models.ankle_with_rods(), ends)["COORDINATES"]
+    assert {"e0_rod_left", "e0_cylinder_left"} <= set(found)
+    assert "e0_rod_right" not in found
