@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 TOUCHING = ("Revolute", "Spherical", "Universal")
 """Joints in which two points coincide, by their first rows."""
 NOISE = 1e-9
-"""What rounding errors of the position leave of a number that is whole, of size one."""
+"""Rounding errors of the position, in numbers of size one."""
 
 
 def without_legs(
