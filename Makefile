@@ -32,7 +32,7 @@ BENCH_READY := $(VENV)/bench.stamp
 help:
 	@echo "make demo            compile the wrecker boom, run it, show it on a page"
 	@echo "make test            run the tests (4 minutes)     make test-all     and the exhaustive rest"
-	@echo "make test-elsewhere  make test as on an older processor: numbers in emitted text are the same"
+	@echo "make test-elsewhere  what computes, as on an older processor: numbers in emitted text are the same"
 	@echo "make lint            ruff; tsc, eslint of pages    make format       repair what ruff can"
 	@echo "make types           mypy                          make bench        the benchmarks"
 	@echo "make budget          count the lines and what new things touch; fail above .ci/budget.toml"
@@ -90,13 +90,16 @@ test-slow: $(PAGES_READY)
 
 # An older processor: other kernels of OpenBLAS, in two threads, and NumPy and libm without AVX2 and
 # FMA. Each rounds in its own way; variables that a system does not know do nothing. NumPy names its
-# features.
+# features. Folders whose tests do not compute (words, files, pages, messages) run in `make test` alone.
+ROUNDED := $(addprefix tests/,adversary goldens physics targets trust unit/test_readme.py) \
+	$(addprefix tests/unit/,calculus compare constraints derivation derive design dynamics ir model \
+	runtime solver spatial structure targets transmissions)
 FEATURES := from numpy._core._multiarray_umath import __cpu_dispatch__ as names; print(*names)
 test-elsewhere: export OPENBLAS_CORETYPE := Haswell
 test-elsewhere: export OPENBLAS_NUM_THREADS := 2
 test-elsewhere: export GLIBC_TUNABLES := glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usable,-FMA_Usable
 test-elsewhere: $(TEST_READY)
-	@NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c '$(FEATURES)')" $(PYTEST) --numprocesses=auto --dist=loadfile
+	@NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c '$(FEATURES)')" $(PYTEST) --numprocesses=auto --dist=loadfile $(ROUNDED)
 
 # The scripts of a page share one scope, so that each kind of page is read by itself.
 PAGES := plane space gallery watch
@@ -121,7 +124,7 @@ budget: $(VENV_READY)
 
 # Emission must not depend on the order of a set: the same bytes under every hash seed.
 goldens: $(TEST_READY)
-	@$(PYTEST) --numprocesses=auto tests/goldens
+	@$(PYTEST) --numprocesses=auto -m "slow or not slow" tests/goldens
 
 # Fails by design after a rewrite, so that nothing passes by updating.
 update-goldens: $(TEST_READY)

@@ -272,9 +272,8 @@ def test_that_the_block_on_imports_does_block():
         run("-I", "-c", code)
 
 
-@pytest.mark.parametrize(
-    "seed", ["4242", *(pytest.param(seed, marks=pytest.mark.slow) for seed in ("0", "1"))]
-)
+# Two seeds: the processes of the other tests have a random one, and compare with the same digests.
+@pytest.mark.parametrize("seed", ["0", "1"])
 @pytest.mark.slow
 def test_that_the_bytes_do_not_depend_on_the_hash_seed(example_named, seed):
     names = [*EXAMPLES, *IN_SPACE]
