@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from docs.builders.places import DOCS
+from kincompile.files.dimensions import PLANE, SPACE, dimensions
 from kincompile.files.file_format import DECLARED
 from kincompile.model.declared import CONSTANT, declared_fields, expected
 from kincompile.model.tasks import TARGETS
@@ -28,8 +29,15 @@ def page() -> str:
 def _tables() -> Iterator[str]:
     yield "| table | field | what it is | without it | meaning |"
     yield "| --- | --- | --- | --- | --- |"
-    for name, cls in (*DECLARED.items(), *((f"target `{x}`", cls) for x, cls in TARGETS.items())):
-        title = name if "`" in name else f"`{name}`"
+    plane, space = dimensions(PLANE), dimensions(SPACE)
+    tables = {
+        **{f"`{name}`": cls for name, cls in DECLARED.items()},
+        **{f"target `{name}`": cls for name, cls in TARGETS.items()},
+        **{f"part `{name}`": cls for name, cls in plane.parts().items()},
+        **{f"in space `{name}`": cls for name, cls in space.tables().items()},
+        **{f"in space part `{name}`": cls for name, cls in space.parts().items()},
+    }
+    for title, cls in tables.items():
         for field, item in declared_fields(cls).items():
             default = "needed" if item.is_required else _default(item.default)
             unit = f" [{item.unit}]" if item.unit else ""

@@ -15,7 +15,6 @@ import sympy
 
 import kincompile as kc
 from kincompile.errors import InputError
-from kincompile.files.file_format import MOST_POINTS
 from kincompile.files.formula_text import ExpressionError
 from kincompile.files.safe_expressions import parse_expression
 from kincompile.model.bodies import default_values
@@ -24,6 +23,7 @@ from kincompile.model.expressions import (
     evaluate,
     number_in,
 )
+from kincompile.model.sections import MOST_POINTS
 from kincompile.names import column_name, rate
 
 if TYPE_CHECKING:

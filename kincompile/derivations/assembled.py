@@ -61,6 +61,9 @@ EULER_PARAMETERS: doc.Runs = (
 )
 """What the letters of a derivation in space mean (Haug, chapter 9)."""
 
+ORIENTATIONS: Mapping[str, doc.Runs] = {"Euler parameters": EULER_PARAMETERS}
+"""What the letters of an orientation mean, by what formulas of bodies are written in."""
+
 IDENTITIES = (
     "E p = 0", "G p = 0", "E E^T = I", "G G^T = I", "E^T E = I - p p^T", "G^T G = I - p p^T",
     "A = E G^T", "A^T A = I", "E p_dot = - E_dot p", "G p_dot = - G_dot p", "E_dot p_dot = 0",
@@ -77,8 +80,9 @@ IDENTITIES = (
 
 
 def orientation_in_words(system: ConstraintSystem) -> list[doc.Block]:
-    """Return what the letters of an orientation mean, in space; an angle needs no words."""
-    return [doc.text(*EULER_PARAMETERS)] if system.ground.kind.turning[0] else []
+    """Return what the letters of an orientation mean; an angle needs no words."""
+    words = ORIENTATIONS.get(system.ground.kind.written_in)
+    return [doc.text(*words)] if words else []
 
 
 def unknowns_section(figures: Figures) -> doc.Chapter:

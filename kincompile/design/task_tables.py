@@ -31,7 +31,7 @@ from kincompile.design import targets
 from kincompile.design.deviation import Deviation
 from kincompile.errors import InputError
 from kincompile.files.data_text import listed_problems
-from kincompile.files.file_format import FIELDS
+from kincompile.files.file_format import fields_of
 from kincompile.files.sweep_table import task_reader
 from kincompile.model import tasks
 from kincompile.model.expressions import as_sympy
@@ -100,7 +100,7 @@ def _read(path: str | os.PathLike[str], section: str) -> tuple[FieldReader, Any]
     """Return what reads a file, and its table of a command as a declared class."""
     found = task_reader(path, section)
     if found is None:
-        fields = listed(FIELDS[section], 20)
+        fields = listed(fields_of(section), 20)
         raise InputError(f"{path} has no table [{section}]. Add one; its fields are: {fields}.")
     reader, row = found
     table = reader.table(row, section, (section,))

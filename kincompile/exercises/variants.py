@@ -21,6 +21,7 @@ from kincompile.errors import (
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import GROUND, PLANAR
 from kincompile.model.constraint import Constraint
+from kincompile.model.declared import EXPRESSION, declared_fields
 from kincompile.model.equation import Equation
 from kincompile.model.mechanism import changed
 from kincompile.model.points import BodyPoint
@@ -191,14 +192,14 @@ class VariantBuilder:
         factor, signs = self._factors[body.name], self._signs(body.name)
         own = {
             name: self._value(value, 1.0)
-            for name in ("mass", "density", "thickness")
-            if (value := getattr(body, name)) is not None
+            for name, item in declared_fields(type(body.written())).items()
+            if item.schema == EXPRESSION and (value := getattr(body, name, None)) is not None
         }
         outline = [self._moved_by(corner, signs, factor) for corner in body.outline]
         centre = self._moved_by(body.centre, signs, factor)
         guess = self._guess(body, factor)
-        inertia = self._inertia(body.inertia, signs)
-        return replace(body, guess=guess, outline=outline, centre=centre, inertia=inertia, **own)
+        own |= {"guess": guess, "outline": outline, "centre": centre}
+        return replace(body, **own | {"inertia": self._inertia(body.inertia, signs)})
 
     def _guess(self, body: Body, factor: float) -> tuple[float, ...]:
         """Return the guess; half a turn of a frame is one about zeta, p to p (0, 0, 0, 1)."""

@@ -21,13 +21,13 @@ from kincompile.errors import ModelError
 from kincompile.files.content import decoded
 from kincompile.files.data_text import listed_problems, read_json
 from kincompile.files.file_fields import FieldReader
-from kincompile.files.file_format import MOST_POINTS
 from kincompile.model.absolute import AbsoluteAngle, AbsoluteDistance, AbsoluteX, AbsoluteY
 from kincompile.model.expressions import evaluate, t
 from kincompile.model.gears import RackAndPinion
 from kincompile.model.joints import Revolute, Translational
 from kincompile.model.mechanism import Mechanism
 from kincompile.model.relative import Distance, RelativeX, RelativeY
+from kincompile.model.sections import MOST_POINTS
 from kincompile.names import listed, name_problem, shown, suggestion
 
 if TYPE_CHECKING:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import sympy
 
-from kincompile.files.dimensions import PLANE
 from kincompile.files.file_format import fields_of
 from kincompile.files.sketch_reader import SketchReader
 from kincompile.model.bodies import GROUND, Body
@@ -15,7 +14,6 @@ from kincompile.names import listed, shown, suggestion
 if TYPE_CHECKING:
     from kincompile.files.data_lines import Address
     from kincompile.files.data_text import Document
-    from kincompile.model.expressions import Scalars
     from kincompile.model.points import BodyPoint
 
 Row = dict[str, Any]
@@ -66,27 +64,19 @@ class BodyReader(SketchReader):
         self.remember(f"outline of {name}", (*address, "outline"))
         return body
 
-    def components(self, given: Any, address: Address, words: str) -> tuple[Any, ...]:
-        """Return numbers or formulas, as many as the words have: ``[xi, eta]``."""
-        return tuple(self.expressions(given, address, self.names, words, words.count(",") + 1))
-
-    def place(self, row: Row, address: Address, key: str) -> Scalars:
-        """Return a vector of a table in global directions, zeros where it has none."""
-        words = ("[x, y]", "[x, y, z]")[self.words.count - PLANE]
-        return self.components(row.get(key, [0] * self.words.count), (*address, key), words)
-
     def point(self, address: Address, row: Row) -> BodyPoint | None:
         """Return a named point; its coordinates may occur in every formula."""
-        complete = self.has_fields(address, row, fields_of("point", self.words.count))
+        fields = fields_of("point", self.words.count)
+        complete = self.has_fields(address, row, fields)
         name = self.name(row, address, "a point")
         self.remember(f"point {name!r}", address)
         body = self.body_name(row.get("body", GROUND.name), (*address, "body"))
-        given = row.get("local", [0] * self.words.count)
-        local = self.components(given, (*address, "local"), self.words.place)
+        given = self.values(row, fields, address, self.names, ("name", "body"))
         if not name or not self.is_free(name, address, "point") or not complete:
             return None
         ground = self.words.ground
         owner = ground if body == ground.name else type(ground)(body)
+        local = given.get("local", (0,) * self.words.count)
         point = self.words.mechanism.point_type(name, owner, local)
         self.names |= dict(zip(point.output_names, point.coordinates, strict=True))
         return point

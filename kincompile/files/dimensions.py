@@ -51,6 +51,16 @@ class Dimensions:
         found: type[Drawing[Any]] = _of("sketch", self.count).Sketch
         return found
 
+    def tables(self) -> Mapping[str, type]:
+        """Return the declared classes of tables that are others in the plane and in space."""
+        found: Mapping[str, type] = _of("sections", self.count).TABLES
+        return found
+
+    def parts(self) -> Mapping[str, type]:
+        """Return the parts of a drawing, as declared classes."""
+        found: Mapping[str, type] = _of("sections", self.count).PARTS
+        return found
+
     def loads(self) -> Mapping[str, type[Load]]:
         """Return the types of loads by name, which only a model that has any needs."""
         found: Mapping[str, type[Load]] = _of("loads", self.count).LOADS

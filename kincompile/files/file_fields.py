@@ -6,13 +6,15 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
+from kincompile.errors import ModelError
 from kincompile.files.data_text import MAX_PROBLEMS, listed_problems
-from kincompile.files.file_format import DECLARED, FIELDS, PLAIN_NUMBER, TARGETS
+from kincompile.files.file_format import DECLARED, PLAIN_NUMBER
 from kincompile.files.formula_text import ExpressionError
 from kincompile.files.safe_expressions import parse_expression
 from kincompile.model import tasks
-from kincompile.model.declared import expected, may_be, may_hold
+from kincompile.model.declared import choices, chosen, declared_fields, expected, may_be
 from kincompile.model.expressions import evaluate
+from kincompile.model.sections import Motion
 from kincompile.names import LONGEST, escaped, listed, name_problem, shown, suggestion, unit_problem
 
 if TYPE_CHECKING:
@@ -114,10 +116,11 @@ class FieldReader:
         Without names formulas are numbers.
         """
         if "anyOf" in schema:
-            likely = [item for item in schema["anyOf"] if may_be(given, item)]
-            if likely:
-                best = (item for item in likely if may_hold(given, item))
-                return self.value(given, next(best, likely[0]), address, names)
+            best = chosen(given, schema["anyOf"], lambda name: declared_fields(DECLARED[name]))
+            if best is not None:
+                return self.value(given, best, address, names)
+        elif schema.get("type") == "number":
+            return self.number(given, address)
         elif "$ref" in schema:
             name = schema["$ref"].rpartition("/")[2]
             if name in ("constant", "expression") and names is not None:
@@ -126,17 +129,23 @@ class FieldReader:
             return (
                 self.finite(given, address)
                 if name == "constant"
-                else self.table(given, name, address)
+                else self.table(given, name, address, names)
             )
         elif may_be(given, schema):
             return self._members(given, schema, address, names)
-        self.problem(address, f"expected {expected(schema)}, not {shown(given)}")
+        hint = suggestion(given, choices(schema)) if isinstance(given, str) else ""
+        self.problem(address, f"expected {expected(schema)}, not {shown(given)}{hint}")
         return None
 
     def _members(self, given: Any, schema: Schema, address: Address, names: Names | None) -> Any:
         """Return a value whose type fits, and so do the values in it."""
         if schema.get("format") == "unit":
             return self.unit(given, address, self.owner(address))
+        if "pattern" in schema:
+            problem = name_problem(given, f"a {address[-1]}")
+            if problem is not None:
+                self.problem(address, problem)
+            return given
         if isinstance(given, dict):
             of = schema["additionalProperties"]
             return {key: self.value(x, of, (*address, key), names) for key, x in given.items()}
@@ -156,20 +165,34 @@ class FieldReader:
         """Return what a field belongs to, in words: ``parameter 'a'``."""
         return self._field(address[:2])
 
-    def table(self, given: Any, name: str, address: Address) -> Any:
+    def table(self, given: Any, name: str, address: Address, names: Names | None = None) -> Any:
         """Return a table, by its name in the schema, as its declared class; None on a problem."""
         if not isinstance(given, dict):
             self.problem(address, f"expected a table of fields, not {shown(given)}")
             return None
-        kinds = tasks.TARGETS if name == "target" else {name: DECLARED[name]}
-        likely = [kind for kind in kinds if kind in given or name != "target"]
+        if name != "target":
+            return self.made(DECLARED[name], given, address, names)
+        likely = [kind for kind in tasks.TARGETS if kind in given]
         if len(likely) != 1:
-            self.problem(address, f"expected one target: {listed(TARGETS)}, not {shown(given)}")
+            known = listed(tasks.TARGETS)
+            self.problem(address, f"expected one target: {known}, not {shown(given)}")
             return None
-        known, before = (TARGETS if name == "target" else FIELDS)[likely[0]], len(self.problems)
-        self.has_fields(address, given, known)
-        values = self.values(given, known, address, None, ())
-        return None if len(self.problems) > before else kinds[likely[0]](**values)
+        return self.made(tasks.TARGETS[likely[0]], given, address, names)
+
+    def made(self, cls: type, row: Mapping[str, Any], address: Address, names: Names | None) -> Any:
+        """Return the fields of a table as their declared class, a motion as its expression."""
+        known, before = declared_fields(cls), len(self.problems)
+        self.has_fields(address, row, known)
+        values = self.values(row, known, address, names, ())
+        if len(self.problems) > before:
+            return None
+        found = cls(**values)
+        try:
+            return found.expression() if isinstance(found, Motion) else found
+        except ModelError as error:
+            for problem in error.problems:
+                self.problem(address, problem)
+            return None
 
     def rows(
         self, data: Mapping[str, Any], section: str

@@ -7,28 +7,23 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.files.dimensions import PLANE, SPACE, dimensions
 from kincompile.model import declared as kind
-from kincompile.model import tasks
+from kincompile.model import sections, tasks
 from kincompile.model.arguments import Kind
-from kincompile.model.bodies import Body, Coordinate, Parameter
+from kincompile.model.bodies import Coordinate, Parameter
 from kincompile.model.declared import Field, declared_fields
-from kincompile.model.laws import RISES
+from kincompile.model.equation import Equation
 from kincompile.model.outputs import Output
-from kincompile.model.points import BodyPoint
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from kincompile.model.constraint import Constraint
     from kincompile.model.load import Load
 
 VERSION = 1
 """Version of the format, the value of the key `kincompile`."""
-MOST_POINTS = 10_000_000
-"""Largest time grid that a file may ask for."""
 MOST_DRAWN, MOST_JOINTS = 300, 30
 """Largest number of joints, parts and parameters of a drawing, and of joints of one link."""
-SMOOTHNESS = 4
-"""Continuous derivatives of a profile given by a table: it is a periodic quintic spline."""
 
 
 PLAIN_NUMBER = r"^\s*[+-]?(\d[\d_]*\.?[\d_]*|\.\d[\d_]*)([eE][+-]?\d+)?\s*$"
@@ -39,191 +34,72 @@ def _optional(schema: Mapping[str, Any]) -> Field:
     return Field(schema, is_required=False)
 
 
-_POINT, _TRIPLE = kind.components(2), kind.components(3)
-_LOCAL = kind.components(3, words="[xi, eta, zeta]")
-_PLACE = kind.components(3, words="[x, y, z]")
-_MATRIX = kind.components(3, kind.components(3, words="[., ., .]"))
-_NUMBERS: dict[str, Any] = kind.array(kind.NUMBER, 6)
-_VALUES: dict[str, Any] = kind.array(kind.EXPRESSION, 3)
-_LAW: dict[str, Any] = kind.one_of(RISES)
-
-DECLARED: Mapping[str, type] = {
-    "parameter": Parameter, "body": Body, "coordinate": Coordinate, "point": BodyPoint,
-    "output": Output, "sweep": tasks.Sweep, "span": tasks.Span, "fit": tasks.Fit,
-    "tolerance": tasks.Tolerance, "deviation": tasks.Limits,
+TASKS: Mapping[str, type] = {
+    "sweep": tasks.Sweep, "tolerance": tasks.Tolerance, "fit": tasks.Fit,
     "transmission": tasks.Transmission,
 }  # fmt: skip
-"""Tables that are declared classes, by their names in the schema."""
-
-TASKS = ("tolerance", "fit", "sweep", "transmission")
 """Tables that commands of these names read; to a model they belong as data."""
 
-FIELDS: dict[str, Mapping[str, Field]] = {
-    "model": {
-        "$schema": _optional(kind.TEXT),
-        "kincompile": Field({"const": VERSION}),
-        "space": _optional({"enum": [PLANE, SPACE]}),
-        "name": Field(kind.NAME),
-        "length_unit": _optional(kind.TEXT),
-        "analysis": _optional(kind.ref("analysis")),
-        "parameters": _optional(kind.tables("parameter")),
-        "bodies": _optional(kind.tables("body")),
-        "coordinates": _optional(kind.tables("coordinate")),
-        "sketch": _optional(kind.ref("sketch")),
-        "constraints": _optional(kind.tables("constraint")),
-        "gravity": _optional(_POINT),
-        "loads": _optional(kind.tables("load")),
-        "points": _optional(kind.tables("point")),
-        "outputs": _optional(kind.tables("output")),
-        "sweep": _optional(kind.ref("sweep")),
-        "tolerance": _optional(kind.ref("tolerance")),
-        "fit": _optional(kind.ref("fit")),
-        "transmission": _optional(kind.ref("transmission")),
-    },
-    **{name: declared_fields(item) for name, item in DECLARED.items()},
-    "sketch": {
-        "lengths": _optional(kind.named(kind.NUMBER)),
-        "ground": _optional(kind.named(_POINT)),
-        "joints": _optional(kind.named(_POINT)),
-        "parts": Field(kind.tables("part")),
-    },
-    "analysis": {
-        "end": _optional(kind.CONSTANT),
-        "points": _optional(kind.whole(1, MOST_POINTS)),
-    },
-    "profile": {
-        "angles": Field(_NUMBERS),
-        "radii": Field(_NUMBERS),
-        "smoothness": Field({"const": SMOOTHNESS}),
-    },
-    "sequence": {
-        "points": Field(kind.array(_POINT, 2)),
-        "law": _optional(kind.any_of(_LAW, kind.array(_LAW))),
-        "ramp": _optional(kind.EXPRESSION),
-    },
-    "table": {
-        "times": Field(_VALUES),
-        "values": Field(_VALUES),
-        "velocities": _optional({**_POINT}),
-        "over": _optional(kind.EXPRESSION),
-    },
-    "Equation": {
-        "type": Field({"const": "Equation"}),
-        "name": Field(kind.NAME),
-        "expressions": Field(kind.array(kind.EXPRESSION, 1)),
-        "corners": _optional(kind.FLAG),
-    },
-}
-"""Fields of the file itself, of its tables, and of a free equation."""
+DECLARED: Mapping[str, type] = {
+    "analysis": sections.Analysis, "parameter": Parameter, **sections.TABLES,
+    "coordinate": Coordinate, "output": Output, "profile": sections.Profile,
+    "sequence": sections.MotionSteps, "table": sections.MotionRows, **TASKS,
+    "span": tasks.Span, "deviation": tasks.Limits,
+}  # fmt: skip
+"""Tables that are declared classes, by their names in the schema; those of the plane."""
 
-IN_SPACE: dict[str, Mapping[str, Field]] = {
-    "model": {
-        **FIELDS["model"],
-        "space": Field({"const": SPACE}),
-        "sketch": _optional(kind.ref("spatial_sketch")),
-        "bodies": _optional(kind.tables("spatial_body")),
-        "constraints": _optional(kind.tables("spatial_constraint")),
-        "points": _optional(kind.tables("spatial_point")),
-        "gravity": _optional(_TRIPLE),
-        "loads": _optional(kind.tables("spatial_load")),
-    },
-    "body": {
-        "name": Field(kind.NAME),
-        "position": _optional(_PLACE),
-        "orientation": _optional(
-            kind.any_of(kind.components(4, words="[e0, e1, e2, e3]"), _MATRIX)
-        ),
-        **{key: _optional(_PLACE) for key in ("axis", "x", "y", "z")},
-        "angle": _optional(kind.EXPRESSION),
-        "mass": FIELDS["body"]["mass"],
-        "inertia": _optional(
-            kind.any_of(kind.components(3, words="[J_xi, J_eta, J_zeta]"), _MATRIX)
-        ),
-        "centre": _optional(_LOCAL),
-    },
-    "point": {**FIELDS["point"], "local": Field(_LOCAL)},
-    "sketch": {
-        **FIELDS["sketch"],
-        **{name: _optional(kind.named(_TRIPLE)) for name in ("ground", "joints", "hinges")},
-        "parts": Field(kind.tables("spatial_part")),
-    },
-}
-"""Fields of what is different in a file with ``space = 3``."""
+PREFIXES = {PLANE: "", SPACE: "spatial_"}
+"""How the tables of a file begin in the schema, where those of plane and space differ."""
 
 
 def fields_of(table: str, count: int = PLANE) -> Mapping[str, Field]:
     """Return the fields of a table of a file in the plane, or in space."""
-    return {PLANE: FIELDS, SPACE: FIELDS | IN_SPACE}[count][table]
+    if table == "model":
+        return _model(count)
+    return declared_fields({**DECLARED, **dimensions(count).tables()}[table])
 
 
-_MOTIONS = [kind.ref("sequence"), kind.ref("table")]
-VALUE: dict[str, Any] = kind.any_of(kind.EXPRESSION, *_MOTIONS)
-
-
-def _line(place: Mapping[str, Any]) -> dict[str, Field]:
-    """Return the fields of a guide, through two joints or along a direction, and of its link."""
-    along = Field(kind.any_of(kind.TEXT, place))
-    return {"along": along, "on": _optional(kind.NAME)}
-
-
-TARGETS: Mapping[str, Mapping[str, Field]] = {
-    name: declared_fields(item) for name, item in tasks.TARGETS.items()
-}
-"""Targets of a fit: the functions of `kc.targets`, and their arguments."""
-
-PARTS: Mapping[str, Mapping[str, Field]] = {
-    "link": {
-        "link": Field(kind.NAME),
-        "joints": Field(kind.TEXT),
-        "length": _optional(kind.EXPRESSION),
-    },
-    "wheel": {"wheel": Field(kind.NAME), "joint": Field(kind.NAME)},
-    "slider": {"slider": Field(kind.NAME), "joints": Field(kind.TEXT), **_line(_POINT)},
-    "slot": {"slot": Field(kind.NAME), **_line(_POINT)},
-    "gear": {
-        "gear": Field(kind.NAME),
-        "i": Field(kind.NAME), "centre_i": Field(kind.NAME), "radius_i": Field(kind.EXPRESSION),
-        "j": Field(kind.NAME), "centre_j": Field(kind.NAME), "radius_j": Field(kind.EXPRESSION),
-    },
-    "drive": {
-        "drive": Field(kind.TEXT),
-        "value": Field(VALUE),
-        "against": _optional(kind.NAME),
-    },
-}  # fmt: skip
-"""Parts of a drawing: the methods of `Sketch`, and their arguments in order."""
-
-SPATIAL_PARTS: Mapping[str, Mapping[str, Field]] = {
-    "link": {"link": Field(kind.NAME), "joints": Field(kind.TEXT)},
-    "slider": {"slider": Field(kind.NAME), "joints": Field(kind.TEXT), **_line(_TRIPLE)},
-    "rod": {
-        "rod": Field(kind.NAME), "joints": Field(kind.TEXT), "length": _optional(VALUE),
-    },
-    "drive": {"drive": Field(kind.TEXT), "value": Field(VALUE)},
-}  # fmt: skip
-"""Those of `spatial.Sketch`."""
-
-
-def parts_of(count: int) -> Mapping[str, Mapping[str, Field]]:
-    """Return the parts of a drawing in the plane, or in space."""
-    return {PLANE: PARTS, SPACE: SPATIAL_PARTS}[count]
+def _model(count: int) -> dict[str, Field]:
+    """Return the fields of the file itself."""
+    prefix = PREFIXES[count]
+    own = {name: kind.tables(prefix + name) for name in ("body", "constraint", "load", "point")}
+    return {
+        "$schema": _optional(kind.TEXT),
+        "kincompile": Field({"const": VERSION}),
+        "space": Field({"const": SPACE}) if prefix else _optional({"enum": [PLANE, SPACE]}),
+        "name": Field(kind.NAME),
+        "length_unit": _optional(kind.UNIT),
+        "analysis": _optional(kind.ref("analysis")),
+        "parameters": _optional(kind.tables("parameter")),
+        "bodies": _optional(own["body"]),
+        "coordinates": _optional(kind.tables("coordinate")),
+        "sketch": _optional(kind.ref(f"{prefix}sketch")),
+        "constraints": _optional(own["constraint"]),
+        "gravity": _optional(kind.components(count, words=f"[{', '.join('xyz'[:count])}]")),
+        "loads": _optional(own["load"]),
+        "points": _optional(own["point"]),
+        "outputs": _optional(kind.tables("output")),
+        **{name: _optional(kind.ref(name)) for name in TASKS},
+    }
 
 
 _KINDS: Mapping[Kind, Mapping[str, Any]] = {
-    Kind.VALUE: VALUE,
-    Kind.LOAD: VALUE,
-    Kind.DISTANCE: VALUE,
+    Kind.VALUE: kind.VALUE,
+    Kind.LOAD: kind.VALUE,
+    Kind.DISTANCE: kind.VALUE,
     Kind.BODY: kind.NAME,
-    Kind.PROFILE: kind.any_of(kind.EXPRESSION, kind.ref("profile")),
+    Kind.PROFILE: kind.any_of(kind.EXPRESSION, kind.ref("profile"))
+    | {"description": "a number, a formula in alpha, or a table of angles and radii"},
 }
 
 
-def _kind(item: Kind, count: int) -> Mapping[str, Any]:
-    """Return the schema of an argument, whose points have `count` components."""
+def argument_schema(item: Kind, axes: tuple[str, ...]) -> Mapping[str, Any]:
+    """Return the schema of an argument, whose points have components along these axes."""
     if item in (Kind.POINT, Kind.AXIS):
-        return kind.components(count)
+        return kind.components(len(axes), words=f"[{', '.join(axes)}]")
     if item is Kind.LOADS:
-        return kind.components(count, VALUE)
+        words = ", ".join(f"F_{axis}" for axis in "xyz"[: len(axes)])
+        return kind.components(len(axes), kind.VALUE, words=f"[{words}]")
     return _KINDS.get(item, kind.EXPRESSION)
 
 
@@ -231,13 +107,19 @@ def constraint_fields(constraint: type[Constraint]) -> dict[str, Field]:
     """Return the fields of a constraint type: its arguments, and what drivers and cams have."""
     found = {"type": Field({"const": constraint.__name__}), "name": Field(kind.NAME)}
     for name, item in constraint.arguments().items():
-        found[name] = Field(_kind(item.kind, len(constraint.bodies.axes)))
+        found[name] = Field(argument_schema(item.kind, constraint.bodies.axes))
     if any(item.symbol == "C" for item in constraint.arguments().values()):
-        found["corners"] = _optional(kind.FLAG)
-    if constraint.contacts:
-        guesses = kind.array(kind.EXPRESSION, len(constraint.contacts))
-        found["guess"] = _optional(kind.any_of(kind.EXPRESSION, guesses))
+        found |= declared_fields(constraint)
+    if count := len(constraint.contacts):
+        words = {"description": f"{count} start values"}
+        guesses = kind.array(kind.EXPRESSION, count) | words
+        found["guess"] = _optional(kind.any_of(kind.EXPRESSION, guesses) | words)
     return found
+
+
+def equation_fields() -> dict[str, Field]:
+    """Return the fields of a free equation among the constraints."""
+    return {"type": Field({"const": Equation.__name__}), **declared_fields(Equation)}
 
 
 def load_fields(load: type[Load]) -> dict[str, Field]:
@@ -245,7 +127,7 @@ def load_fields(load: type[Load]) -> dict[str, Field]:
     given = {item.name: item for item in fields(load)}
     found = {"type": Field({"const": load.__name__}), "name": Field(kind.NAME)}
     for name, item in load.arguments().items():
-        schema = _kind(item.kind, len(load.bodies.axes))
+        schema = argument_schema(item.kind, load.bodies.axes)
         found[name] = Field(schema, is_required=given[name].default is MISSING)
     return found
 
@@ -255,11 +137,18 @@ def model_schema() -> dict[str, Any]:
 
     Whether a formula can be read and a body exists is checked by `kincompile inspect`.
     """
-    tables = {name: _object(FIELDS[name]) for name in FIELDS if name not in ("model", "Equation")}
-    in_space = {f"spatial_{name}": _object(IN_SPACE[name]) for name in IN_SPACE if name != "model"}
-    parts = [_object(item) for item in PARTS.values()]
+    tables = {name: object_schema(declared_fields(cls)) for name, cls in DECLARED.items()}
+    for count, prefix in PREFIXES.items():
+        words = dimensions(count)
+        tables |= {
+            prefix + x: object_schema(declared_fields(cls)) for x, cls in words.tables().items()
+        }
+        types = [constraint_fields(item) for item in words.constraints.values()]
+        tables[f"{prefix}constraint"] = _one_of([*types, equation_fields()])
+        tables[f"{prefix}load"] = _one_of(map(load_fields, words.loads().values()))
+        tables[f"{prefix}part"] = _one_of(map(declared_fields, words.parts().values()))
     # Lengths and places of a link are called as its joints are.
-    parts[0]["additionalProperties"] = kind.any_of(kind.EXPRESSION, _POINT)
+    tables["part"]["oneOf"][0]["additionalProperties"] = LENGTHS_AND_PLACES
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"Mechanism for kincompile, format {VERSION}",
@@ -268,8 +157,8 @@ def model_schema() -> dict[str, Any]:
         "then": kind.ref("in_space"),
         "else": kind.ref("in_the_plane"),
         "$defs": {
-            "in_the_plane": _object(FIELDS["model"]),
-            "in_space": _object(IN_SPACE["model"]),
+            "in_the_plane": object_schema(fields_of("model", PLANE)),
+            "in_space": object_schema(fields_of("model", SPACE)),
             "expression": {
                 "description": "a number, or a formula such as -a/2 + sin(omega*t)",
                 "type": ["number", "string"],
@@ -280,28 +169,23 @@ def model_schema() -> dict[str, Any]:
                 "not": {"type": "string", "pattern": PLAIN_NUMBER},
             },
             **tables,
-            **in_space,
-            "part": {"oneOf": parts},
-            "spatial_part": {"oneOf": [_object(item) for item in SPATIAL_PARTS.values()]},
-            "target": {"oneOf": [_object(item) for item in TARGETS.values()]},
-            "constraint": {"oneOf": _constraints(PLANE)},
-            "spatial_constraint": {"oneOf": _constraints(SPACE)},
-            "load": {"oneOf": _loads(PLANE)},
-            "spatial_load": {"oneOf": _loads(SPACE)},
+            "target": _one_of(map(declared_fields, tasks.TARGETS.values())),
         },
     }
 
 
-def _loads(count: int) -> list[dict[str, Any]]:
-    return [_object(load_fields(item)) for item in dimensions(count).loads().values()]
+LENGTHS_AND_PLACES = kind.any_of(kind.EXPRESSION, kind.components(2, words="[xi, eta]")) | {
+    "description": "a length, or a place [xi, eta]"
+}
+"""What else a link of the plane has, by the names of its joints."""
 
 
-def _constraints(count: int) -> list[dict[str, Any]]:
-    kinds = dimensions(count).constraints.values()
-    return [*(_object(constraint_fields(item)) for item in kinds), _object(FIELDS["Equation"])]
+def _one_of(tables: Iterable[Mapping[str, Field]]) -> dict[str, Any]:
+    return {"oneOf": list(map(object_schema, tables))}
 
 
-def _object(fields: Mapping[str, Field]) -> dict[str, Any]:
+def object_schema(fields: Mapping[str, Field]) -> dict[str, Any]:
+    """Return the schema of a table with these fields."""
     return {
         "type": "object",
         "properties": {

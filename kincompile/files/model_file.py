@@ -23,36 +23,29 @@ from typing import TYPE_CHECKING, Any
 import sympy
 
 from kincompile.errors import ModelError
+from kincompile.files import file_format as form
 from kincompile.files.body_reader import BodyReader
 from kincompile.files.data_text import listed_problems, read_json, read_toml
 from kincompile.files.dimensions import PLANE, SPACE, dimensions
-from kincompile.files.file_format import (
-    FIELDS,
-    MOST_POINTS,
-    SMOOTHNESS,
-    TASKS,
-    VERSION,
-    constraint_fields,
-    fields_of,
-    load_fields,
-)
 from kincompile.model.arguments import Kind
-from kincompile.model.bodies import Coordinate, Parameter
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import alpha, t
-from kincompile.model.outputs import Output
+from kincompile.model.sections import Profile
 from kincompile.model.system import ConstraintSystem
 from kincompile.names import listed, rate, shown, suggestion
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Mapping
     from pathlib import Path
 
     from kincompile.files.data_lines import Address
     from kincompile.model.arguments import Argument
+    from kincompile.model.bodies import Coordinate, Parameter
     from kincompile.model.constraint import Constraint, Element
+    from kincompile.model.declared import Field, Schema
     from kincompile.model.load import Load
     from kincompile.model.mechanism import Mechanism
+    from kincompile.model.outputs import Output
 
 Row = dict[str, Any]
 
@@ -86,7 +79,7 @@ class _ModelReader(BodyReader):
         data = self.document.data
         if not self._is_model(data):
             return None
-        self.has_fields((), data, fields_of("model", self.words.count))
+        self.has_fields((), data, form.fields_of("model", self.words.count))
         name = self.name(data, (), "the model") or "model"
         given = [self._parameter(*item) for item in self.rows(data, "parameters")]
         parameters = [item for item in given if item]
@@ -113,14 +106,21 @@ class _ModelReader(BodyReader):
             "constraints": [*drawn.constraints, *(item for item in constraints if item)],
             "outputs": [*drawn.outputs, *(item for item in (*points, *outputs) if item)],
             "loads": [item for item in loads if item],
-            "gravity": self.place(data, (), "gravity"),
+            "gravity": self._gravity(data),
             "tasks": self._tasks(data),
         }
         return self._checked(name, content, options)
 
+    def _gravity(self, data: Row) -> tuple[Any, ...]:
+        """Return the components of gravity, zeros where the file has none."""
+        schema = form.fields_of("model", self.words.count)["gravity"].schema
+        nothing = [0] * self.words.count
+        given = self.value(data.get("gravity", nothing), schema, ("gravity",), self.names)
+        return tuple(given or nothing)
+
     def _tasks(self, data: Row) -> Row:
         """Return the tables of commands, whose fields are those of the format."""
-        found = {key: data[key] for key in TASKS if key in data}
+        found = {key: data[key] for key in form.TASKS if key in data}
         for key, table in found.items():
             self.table(table, key, (key,))
         return found
@@ -130,11 +130,14 @@ class _ModelReader(BodyReader):
         if not isinstance(data, dict):
             self.problem((), f"expected names and values, not {shown(data)}")
         elif "kincompile" not in data:
-            self.problem((), f"this is not a model for kincompile: one says kincompile = {VERSION}")
-        elif type(data["kincompile"]) is not int or data["kincompile"] != VERSION:
+            self.problem(
+                (), f"this is not a model for kincompile: one says kincompile = {form.VERSION}"
+            )
+        elif type(data["kincompile"]) is not int or data["kincompile"] != form.VERSION:
             given = shown(data["kincompile"])
             self.problem(
-                ("kincompile",), f"format {VERSION} is read here, not {given}; convert the file"
+                ("kincompile",),
+                f"format {form.VERSION} is read here, not {given}; convert the file",
             )
         elif not self._has_dimensions(data.get("space", PLANE)):
             text = f"it is {PLANE} or {SPACE}, not {shown(data['space'])}"
@@ -183,47 +186,41 @@ class _ModelReader(BodyReader):
         return None
 
     def _analysis(self, given: Any) -> Row:
-        if not isinstance(given, dict):
-            self.problem(("analysis",), f"expected a table of end and points, not {shown(given)}")
-            return {}
-        self.has_fields(("analysis",), given, FIELDS["analysis"])
-        found: Row = {}
-        if "end" in given:
-            names = {name: symbol for name, symbol in self.names.items() if symbol != t}
-            found["end"] = self.constant(given["end"], ("analysis", "end"), names)
-        points = given.get("points", 101)
-        if type(points) is int and 1 <= points <= MOST_POINTS:
-            return {**found, "points": points}
-        text = f"expected a whole number from 1 to {MOST_POINTS:,}, not {shown(points)}"
-        self.problem(("analysis", "points"), text)
-        return found
+        names = {name: symbol for name, symbol in self.names.items() if symbol != t}
+        found = self.table(given, "analysis", ("analysis",), names)
+        return {} if found is None else vars(found)
+
+    def _titled(
+        self, table: str, address: Address, row: Row, names: Mapping[str, sympy.Expr], words: str
+    ) -> Any:
+        """Return a table with a name as its declared class; None where the name cannot be used.
+
+        `words` are how the checks of the system call it. An output is no symbol of formulas.
+        """
+        fields, is_output = form.fields_of(table), table == "output"
+        complete = self.has_fields(address, row, fields)
+        name = self.name(row, address, "an output" if is_output else f"a {table}")
+        given = self.values(row, fields, address, names)
+        self.remember(words.format(name), address)
+        if name and not is_output:
+            self.names[name] = sympy.Symbol(name)
+        is_new = self.is_free(name, address, table if is_output else "symbol")
+        return form.DECLARED[table](name, **given) if is_new and complete else None
 
     def _parameter(self, address: Address, row: Row) -> Parameter | None:
-        complete = self.has_fields(address, row, FIELDS["parameter"])
-        name = self.name(row, address, "a parameter")
-        given = self.values(row, FIELDS["parameter"], address, {})
-        if name:
-            self.names[name] = sympy.Symbol(name)
-            self.remember(f"parameter {name!r}", address)
-        is_new = self.is_free(name, address)
-        return Parameter(name, **{"default": 1.0, **given}) if is_new and complete else None
+        found: Parameter | None = self._titled("parameter", address, row, {}, "parameter {!r}")
+        return found
 
     def _coordinate(self, address: Address, row: Row) -> Coordinate | None:
-        self.has_fields(address, row, FIELDS["coordinate"])
-        name = self.name(row, address, "a coordinate")
-        given = self.values(row, FIELDS["coordinate"], address, self.names)
-        if name:
-            self.names[name] = sympy.Symbol(name)
-            self.remember(f"guess of {name}", address)
-        return Coordinate(name, **given) if self.is_free(name, address) else None
+        found: Coordinate | None = self._titled(
+            "coordinate", address, row, self.names, "guess of {}"
+        )
+        return found
 
     def _output(self, address: Address, row: Row) -> Output | None:
-        complete = self.has_fields(address, row, FIELDS["output"])
-        name = self.name(row, address, "an output")
-        self.remember(f"output {name!r}", address)
-        given = self.values(row, FIELDS["output"], address, self._moving_names())
-        is_new = self.is_free(name, address, "output")
-        return Output(name, **{"expression": 0, **given}) if is_new and complete else None
+        names = self._moving_names()
+        found: Output | None = self._titled("output", address, row, names, "output {!r}")
+        return found
 
     def _moving_names(self) -> dict[str, sympy.Expr]:
         """Return the names that may occur in an output or a load: those of rates too."""
@@ -232,8 +229,7 @@ class _ModelReader(BodyReader):
         return {**self.names, **self.spins, **{item: sympy.Symbol(item) for item in rates}}
 
     def _load(self, address: Address, row: Row) -> Load | None:
-        known = self.words.loads()
-        before = len(self.problems)
+        before, known = len(self.problems), self.words.loads()
         name = self.name(row, address, "a load")
         kind = self._type_of(row, address, known)
         if kind is None:
@@ -241,8 +237,7 @@ class _ModelReader(BodyReader):
         self.is_free(name, address, "load")
         self.remember(f"{kind} {name!r}", address)
         self.remember(f"the load {name!r}", address)
-        self.has_fields(address, row, load_fields(known[kind]))
-        given = self._arguments(address, row, known[kind], name)
+        given = self._arguments(address, row, known[kind], form.load_fields(known[kind]))
         return known[kind](name, **given) if len(self.problems) == before else None
 
     def _type_of(self, row: Row, address: Address, known: Collection[str]) -> str | None:
@@ -269,12 +264,15 @@ class _ModelReader(BodyReader):
             return None
         name = self.name(row, address, "a constraint")
         self._remember_constraint(kind, name, address)
-        found = (
-            self._equation(address, row, name)
-            if kind == "Equation"
-            else self._joint(address, row, known[kind], name)
-        )
-        return found if len(self.problems) == before else None
+        if kind == "Equation":
+            given = self._arguments(address, row, Equation, form.equation_fields())
+        else:
+            given = self._arguments(address, row, known[kind], form.constraint_fields(known[kind]))
+        if len(self.problems) > before:
+            return None
+        if kind == "Equation":
+            return Equation(name, *given.pop("expressions"), **given)
+        return known[kind](name, **given)
 
     def _remember_constraint(self, kind: str, name: str, address: Address) -> None:
         """Note how the checks of the system call a constraint and its arguments."""
@@ -282,91 +280,29 @@ class _ModelReader(BodyReader):
         for title in (f"{kind} {name!r}", f"equation {name!r}", f"equation '{name}."):
             self.remember(title, address)
 
-    def _equation(self, address: Address, row: Row, name: str) -> Equation:
-        self.has_fields(address, row, FIELDS["Equation"])
-        given, place = row.get("expressions", [1]), (*address, "expressions")
-        count = max(1, len(given)) if isinstance(given, list) else 1
-        return Equation(
-            name,
-            *self.expressions(given, place, self.names, "a list of formulas", count),
-            corners=self._corners(row, address),
-        )
-
-    def _joint(
-        self, address: Address, row: Row, kind: type[Constraint], name: str
-    ) -> Constraint | None:
-        fields = constraint_fields(kind)
+    def _arguments(
+        self,
+        address: Address,
+        row: Row,
+        cls: type[Element | Equation],
+        fields: Mapping[str, Field],
+    ) -> Row:
+        """Return the fields that are given, whose places the checks of the system know."""
         self.has_fields(address, row, fields)
-        arguments = self._arguments(address, row, kind, name)
-        if len(arguments) < len(kind.arguments()):
-            return None
-        if "guess" in row and "guess" in fields:
-            arguments["guess"] = self._contact_guess(kind, row["guess"], (*address, "guess"))
-        return kind(name, **arguments, corners=self._corners(row, address))
-
-    def _arguments(self, address: Address, row: Row, kind: type[Element], name: str) -> Row:
-        """Return the arguments that are given, whose places the checks of the system know."""
-        found = {
-            key: self._argument(item, row[key], (*address, key))
-            for key, item in kind.arguments().items()
-            if key in row
-        }
-        for key in found:
-            self.remember(f"{kind.__name__} {name!r}, {key}", (*address, key))
+        known: Mapping[str, Argument] = getattr(cls, "arguments", dict)()
+        found = {}
+        for key in (key for key in fields if key in row and key not in ("type", "name")):
+            place = (*address, key)
+            found[key] = self._argument(known.get(key), row[key], fields[key].schema, place)
+            self.remember(f"{cls.__name__} {row.get('name')!r}, {key}", place)
         return found
 
-    def _contact_guess(self, kind: type[Constraint], given: Any, address: Address) -> Any:
-        if not isinstance(given, list):
-            return self.expression(given, address, self.names)
-        count = len(kind.contacts)
-        return self.expressions(given, address, self.names, f"{count} start values", count)
-
-    def _argument(self, item: Argument, given: Any, address: Address) -> Any:
-        if item.kind is Kind.BODY:
+    def _argument(self, item: Argument | None, given: Any, schema: Schema, address: Address) -> Any:
+        kind = item and item.kind
+        if kind is Kind.BODY:
             return self.body_name(given, address)
-        if item.kind in (Kind.POINT, Kind.AXIS):
-            return self.components(given, address, self.words.place)
-        if item.kind is Kind.PROFILE:
-            return self._profile(given, address)
-        if item.kind in (Kind.VALUE, Kind.DISTANCE):
-            return self.driven(given, address)
-        if item.kind is Kind.LOAD:
-            return self._force(given, address)
-        if item.kind is Kind.LOADS:
-            size = self.words.count
-            if not isinstance(given, list) or len(given) != size:
-                expected = ("[F_x, F_y]", "[F_x, F_y, F_z]")[size - PLANE]
-                self.problem(address, f"expected {expected}, not {shown(given)}")
-                return (1.0,) * size
-            return tuple(self._force(part, (*address, k)) for k, part in enumerate(given))
-        return self.expression(given, address, self.names)
-
-    def _force(self, given: Any, address: Address) -> Any:
-        if isinstance(given, dict):
-            return self.driven(given, address)
-        return self.expression(given, address, self._moving_names())
-
-    def _profile(self, given: Any, address: Address) -> Any:
-        if not isinstance(given, dict):
-            return self.expression(given, address, {**self.names, alpha.name: alpha})
-        if not self.has_fields(address, given, FIELDS["profile"]):
-            return 1.0
-        if given["smoothness"] != SMOOTHNESS or isinstance(given["smoothness"], bool):
-            self.problem(
-                (*address, "smoothness"),
-                f"a table becomes a periodic quintic spline with {SMOOTHNESS} continuous "
-                f"derivatives; write smoothness = {SMOOTHNESS}",
-            )
-        return tuple(self._numbers(given[key], (*address, key)) for key in ("angles", "radii"))
-
-    def _corners(self, row: Row, address: Address) -> bool:
-        given = row.get("corners", False)
-        if not isinstance(given, bool):
-            self.problem((*address, "corners"), f"expected true or false, not {shown(given)}")
-        return given is True
-
-    def _numbers(self, given: Any, address: Address) -> list[float]:
-        if not isinstance(given, list):
-            self.problem(address, f"expected a list of numbers, not {shown(given)}")
-            return []
-        return [self.number(item, (*address, k)) for k, item in enumerate(given)]
+        names = self._moving_names() if kind in (Kind.LOAD, Kind.LOADS) else self.names
+        if kind is Kind.PROFILE:
+            names = {**names, alpha.name: alpha}
+        found = self.value(given, schema, address, names)
+        return (found.angles, found.radii) if isinstance(found, Profile) else found

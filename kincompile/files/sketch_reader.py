@@ -9,8 +9,13 @@ import sympy
 from kincompile.errors import ModelError
 from kincompile.files.dimensions import PLANE, Dimensions, dimensions
 from kincompile.files.file_fields import FieldReader
-from kincompile.files.file_format import FIELDS, MOST_DRAWN, MOST_JOINTS, VALUE, fields_of, parts_of
-from kincompile.model import motion
+from kincompile.files.file_format import (
+    LENGTHS_AND_PLACES,
+    MOST_DRAWN,
+    MOST_JOINTS,
+    fields_of,
+)
+from kincompile.model.declared import declared_fields
 from kincompile.model.expressions import t
 from kincompile.model.points import BodyPoint
 from kincompile.names import listed, name_problem, shown
@@ -21,7 +26,6 @@ if TYPE_CHECKING:
     from kincompile.files.data_lines import Address
     from kincompile.files.data_text import Document
     from kincompile.model.bodies import Parameter
-    from kincompile.model.declared import Field
     from kincompile.model.mechanism import Mechanism
 
 Row = dict[str, Any]
@@ -57,7 +61,10 @@ class SketchReader(FieldReader):
             self.remember(f"parameter {key!r}", address)
         for section in (item for item in ("ground", "joints", "hinges") if item in known):
             for key, address, value in self._named(given, section):
-                getattr(sketch, section)(**{key: self._place(value, address)})
+                place = self.value(
+                    value, known[section].schema["additionalProperties"], address, self.names
+                )
+                getattr(sketch, section)(**{key: place or (0,) * self.words.count})
                 self.remember(f"{'hinge' if section == 'hinges' else 'joint'} {key!r}", address)
         self.remember("no link has the joint", (*PLACE, "joints"))
         for k, row in enumerate(self._within(given, "parts", [])):
@@ -96,30 +103,25 @@ class SketchReader(FieldReader):
                 self.problem(address, problem)
         return entries
 
-    def _place(self, value: Any, address: Address) -> tuple[Any, ...]:
-        what = f"[{', '.join('xyz'[: self.words.count])}]"
-        return tuple(self.expressions(value, address, self.names, what, self.words.count))
-
     def _part(self, sketch: Any, address: Address, row: Any) -> None:
         """Draw a part: a link, a wheel, a slider, a slot, a gear, a rod, a drive."""
-        parts = parts_of(self.words.count)
+        parts = self.words.parts()
         kind = next((kind for kind in parts if isinstance(row, dict) and kind in row), None)
         if kind is None:
             self.problem(address, f"expected a table with one of {listed(parts, 20)}")
             return
-        fields, before = parts[kind], len(self.problems)
+        fields, before = declared_fields(parts[kind]), len(self.problems)
         # What else a link of the plane has are lengths and places, by the names of its joints.
-        is_open = kind == "link" and "length" in fields
-        self.has_fields(
-            address, {key: row[key] for key in row if not is_open or key in fields}, fields
-        )
+        is_open = "length" in fields and kind == "link"
+        further = {key: row[key] for key in row if is_open and key not in fields}
+        own = {key: row[key] for key in row if key not in further}
+        made = self.made(parts[kind], own, address, self.names)
         given = {
-            key: self._value(value, (*address, key), fields.get(key)) for key, value in row.items()
+            key: self.value(x, LENGTHS_AND_PLACES, (*address, key), self.names)
+            for key, x in further.items()
         }
-        if len(str(given.get("joints", "")).replace(",", " ").split()) > MOST_JOINTS:
+        if len(str(row.get("joints", "")).replace(",", " ").split()) > MOST_JOINTS:
             self.problem((*address, "joints"), f"a link has at most {MOST_JOINTS} joints")
-        if kind not in ("slot", "drive") and (problem := name_problem(row[kind], f"a {kind}")):
-            self.problem((*address, kind), problem)
         if len(self.problems) > before:
             return
         name = row[kind]
@@ -134,60 +136,4 @@ class SketchReader(FieldReader):
                 self.names[coordinate] = sympy.Symbol(coordinate)
                 self.remember(f"guess of {coordinate}", address)
             self.spins |= {key: spin for key, spin, _ in body.on_request}
-        arguments = [given.pop(key) for key in fields if key in given and key != "on"]
-        getattr(sketch, kind)(*arguments, **given)
-
-    def _value(self, value: Any, address: Address, field: Field | None) -> Any:
-        """Return a text, a place, a motion or an expression: what the field wants."""
-        schema = field.schema if field else {}
-        is_line = address[-1] == "along"
-        if schema.get("type") == "string" or (is_line and isinstance(value, str)):
-            if not isinstance(value, str):
-                self.problem(address, f"expected a text, not {shown(value)}")
-            return value
-        if is_line or (field is None and isinstance(value, list)):
-            return self._place(value, address)
-        return self.driven(value, address) if schema is VALUE else self._free(value, address)
-
-    def _free(self, value: Any, address: Address) -> Any:
-        return self.expression(value, address, self.names)
-
-    def driven(self, given: Any, address: Address) -> Any:
-        """Return the value of a driver: a formula, a sequence of motions, or a table over time."""
-        if not isinstance(given, dict):
-            return self._free(given, address)
-        before = len(self.problems)
-        kind = "table" if "times" in given or "values" in given else "sequence"
-        if not self.has_fields(address, given, FIELDS[kind]):
-            return 1.0
-        columns: dict[str, Any] = {
-            key: self._values(given[key], (*address, key), key)
-            for key in ("points", "times", "values", "velocities")
-            if key in given
-        }
-        if "ramp" in given:
-            columns["ramp"] = self._free(given["ramp"], (*address, "ramp"))
-        if "law" in given:
-            columns["law"] = given["law"]
-        over = self._free(given["over"], (*address, "over")) if "over" in given else t
-        if len(self.problems) > before:
-            return 1.0
-        try:
-            made = (motion.table if kind == "table" else motion.sequence)(**columns)
-            return made.subs(t, over)
-        except ModelError as error:
-            for problem in error.problems:
-                self.problem(address, problem)
-            return 1.0
-
-    def _values(self, given: Any, address: Address, key: str) -> Any:
-        """Return a list of formulas, of points a list of pairs."""
-        if not isinstance(given, list):
-            self.problem(address, f"expected a list, not {shown(given)}")
-            return []
-        if key != "points":
-            return self.expressions(given, address, self.names, "a list", len(given))
-        return [
-            self.expressions(point, (*address, k), self.names, "[time, value]", 2)
-            for k, point in enumerate(given)
-        ]
+        getattr(sketch, kind)(*(x for x in vars(made).values() if x is not None), **given)

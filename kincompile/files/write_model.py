@@ -9,8 +9,8 @@ import sympy
 from sympy.printing.str import StrPrinter
 
 from kincompile.errors import ModelError
-from kincompile.files.dimensions import PLANE, SPACE
-from kincompile.files.file_format import SMOOTHNESS, TASKS, VERSION, load_fields
+from kincompile.files.dimensions import SPACE
+from kincompile.files.file_format import TASKS, VERSION, load_fields
 from kincompile.model.arguments import Kind
 from kincompile.model.bodies import Body
 from kincompile.model.constraint import CamConstraint, Constraint, Element
@@ -20,6 +20,7 @@ from kincompile.model.expressions import as_expression, as_sympy, deg, t
 from kincompile.model.laws import TableLaw
 from kincompile.model.outputs import Output, ResolvedOutput
 from kincompile.model.resolve import Joint
+from kincompile.model.sections import SMOOTHNESS, Analysis, MotionRows, Profile
 from kincompile.model.system import ConstraintSystem
 from kincompile.model.text_views import model_text
 
@@ -45,7 +46,7 @@ def model_data(system: ConstraintSystem) -> dict[str, Any]:
     """Return a system as the values of a model file."""
     sections = {
         "parameters": [row(item) for item in system.parameters],
-        "bodies": [_body(item) for item in system.bodies],
+        "bodies": [row(item.written()) for item in system.bodies],
         "coordinates": [row(item) for item in _free_coordinates(system)],
         "points": [row(item) for item in system.body_points],
         "outputs": _outputs(system),
@@ -58,16 +59,17 @@ def model_data(system: ConstraintSystem) -> dict[str, Any]:
         "name": system.name,
         **({"space": SPACE} if len(system.ground.kind.axes) == SPACE else {}),
         "length_unit": system.length_unit,
-        "analysis": {"end": _end(system), "points": int(system.points)},
+        "analysis": row(_analysis(system)),
         **({"gravity": gravity} if any(gravity) else {}),
         **{name: rows for name, rows in sections.items() if rows},
         **system.tasks,
     }
 
 
-def _end(system: ConstraintSystem) -> int | float | str:
+def _analysis(system: ConstraintSystem) -> Analysis:
     given = system.end_given
-    return value(given) if isinstance(given, sympy.Expr) else float(given)
+    end = given if isinstance(given, sympy.Expr) else float(given)
+    return Analysis(end, int(system.points))
 
 
 def row(item: Any) -> dict[str, Any]:
@@ -98,15 +100,6 @@ def data(given: Any) -> Any:
 def _is_own(item: Joint | FreeEquation) -> bool:
     """Return whether it is an equation that a body brings itself."""
     return isinstance(item, Joint) and item.written.is_own
-
-
-def _body(item: Body) -> dict[str, Any]:
-    """Return a body; one in space has a place and an orientation in place of its guess."""
-    found = row(item)
-    given, size = found["guess"], len(item.kind.axes)
-    parts = {"position": given[:size], "orientation": given[size:]}
-    placed = {PLANE: {"guess": given}, SPACE: parts}[size]
-    return {"name": item.name, **placed, **{k: x for k, x in found.items() if k != "guess"}}
 
 
 def _outputs(system: ConstraintSystem) -> list[dict[str, Any]]:
@@ -173,8 +166,8 @@ def _corners(item: Joint | FreeEquation) -> dict[str, Any]:
 def _scalar(given: Scalar) -> Any:
     """Return a value: a table over time as its columns, anything else as a number or formula."""
     if isinstance(given, TableLaw) and not given.order:
-        table = dict(zip(("times", "values", "velocities"), map(list, given.given), strict=True))
-        return table if given.args == (t,) else {**table, "over": value(given.args[0])}
+        (over,), (times, values, velocities) = given.args, given.given
+        return row(MotionRows(times, values, velocities, None if over == t else over))
     return value(given)
 
 
@@ -182,7 +175,7 @@ def _profile(written: Element, name: str, rho: sympy.Expr) -> Any:
     given = getattr(written, name)
     if isinstance(given, tuple | list):
         angles, radii = ([float(number) for number in column] for column in given)
-        return {"angles": angles, "radii": radii, "smoothness": SMOOTHNESS}
+        return row(Profile(angles, radii, SMOOTHNESS))
     return value(rho)
 
 

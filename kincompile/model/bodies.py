@@ -110,6 +110,10 @@ class Body(Shown):
     # What is wrong with its guess, as it was given.
     problem: str = field(default="", kw_only=True, repr=False)
 
+    def written(self) -> Any:
+        """Return what a file has of it, as a declared class."""
+        return self
+
     def to_text(self) -> str:
         """Return its name, coordinates and guess."""
         names = ", ".join(self.coordinates)

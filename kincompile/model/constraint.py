@@ -14,8 +14,10 @@ from kincompile.calculus.symbols import Contact  # noqa: TC001 - type hints are 
 from kincompile.calculus.template import Template
 from kincompile.html import Shown
 from kincompile.model import arguments as argument
+from kincompile.model import declared as kinds
 from kincompile.model.arguments import Argument, Kind, ValueLike
 from kincompile.model.bodies import GROUND, PLANAR, Body, BodyKind
+from kincompile.model.declared import declared, declared_fields, given
 from kincompile.model.points import BodyPoint
 
 if TYPE_CHECKING:
@@ -127,7 +129,7 @@ class Element(Shown):
         return {"name": "Name of the load."}
 
 
-@dataclass(frozen=True, repr=False)
+@declared(repr=False)
 class Constraint(Element):
     """A joint, or a driver; see `Joint.is_driver`. Every type is a subclass.
 
@@ -136,7 +138,12 @@ class Constraint(Element):
     `catalogue`.
     """
 
-    corners: bool = field(default=False, kw_only=True)
+    corners: bool = given(
+        kinds.FLAG,
+        "Of a driver, whether its velocity may jump: no acceleration is given there.",
+        default=False,
+        kw_only=True,
+    )
 
     sets_motion: ClassVar[bool] = False
     """Whether its value is an angle or a stroke that a motor sets: given by parameters alone, it is
@@ -241,8 +248,7 @@ class Constraint(Element):
             contacts = _listed(what, cls.contacts_of("name"))
             start = "Where Newton's method begins [rad], 0 if not given"
             entries["guess"] = f"{start}; the {contacts}."
-        corners = "Of a driver, whether its velocity may jump: no acceleration is given there."
-        return entries | {"corners": corners}
+        return entries | {"corners": declared_fields(cls)["corners"].words}
 
 
 @dataclass_transform(

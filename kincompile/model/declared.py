@@ -11,7 +11,7 @@ options of the command line and the tables of docs/model_tables.md follow from t
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cache
 from typing import Any, TypeAlias, TypeVar, dataclass_transform, overload
@@ -61,7 +61,9 @@ def given(
 @overload
 def declared(cls: type[Type], /) -> type[Type]: ...
 @overload
-def declared(*, slots: bool, repr: bool = ...) -> Callable[[type[Type]], type[Type]]: ...
+def declared(
+    *, slots: bool = ..., repr: bool = ..., init: bool = ...
+) -> Callable[[type[Type]], type[Type]]: ...
 @dataclass_transform(frozen_default=True, field_specifiers=(given, field))
 def declared(cls: Any = None, /, **options: bool) -> Any:
     """Make a class a declared one: what a user writes, frozen. Options are those of a dataclass."""
@@ -69,9 +71,14 @@ def declared(cls: Any = None, /, **options: bool) -> Any:
     return made if cls is None else made(cls)
 
 
-@cache
-def declared_fields(cls: type) -> dict[str, Field]:
+def declared_fields(cls: type[Any]) -> dict[str, Field]:
     """Return the declared fields of a class, by their names in a file."""
+    of_class: Any = cls  # mypy does not know that classes with an `__eq__` have a hash
+    return _fields_of(of_class)
+
+
+@cache
+def _fields_of(cls: Any) -> dict[str, Field]:
     return {
         item.metadata["key"] or item.name: replace(
             item.metadata["declared"], attribute=item.name, default=item.default
@@ -126,6 +133,10 @@ FLAG: Schema = {"type": "boolean"}
 NAMES: Schema = array(TEXT) | {"description": "a list of names in quotes"}
 EXPRESSION: Schema = ref("expression")
 CONSTANT: Schema = ref("constant")
+VALUE: Schema = any_of(EXPRESSION, ref("sequence"), ref("table")) | {
+    "description": "a number or a formula, or a motion"
+}
+"""The value of a driver or of a load."""
 
 
 def components(count: int, of: Schema = EXPRESSION, words: str = "") -> dict[str, Any]:
@@ -141,12 +152,26 @@ _TYPES: Mapping[str, type | tuple[type, ...]] = {
 }  # fmt: skip
 
 
-def may_hold(value: Any, schema: Schema) -> bool:
-    """Return whether a value is of the type of a kind, and so is what stands in its list."""
-    if not isinstance(value, list) or "items" not in schema:
-        return may_be(value, schema)
-    least, most = schema.get("minItems", 0), schema.get("maxItems", len(value))
-    return least <= len(value) <= most and all(may_be(item, schema["items"]) for item in value)
+def chosen(
+    given: Any, schemas: Sequence[Schema], fields: Callable[[str], Iterable[str]]
+) -> Schema | None:
+    """Return the kind that fits a value best; `fields` are those of a table; None if none fits."""
+
+    def fit(schema: Schema) -> int:
+        if isinstance(given, dict) and "$ref" in schema:
+            return len(given.keys() & set(fields(schema["$ref"].rpartition("/")[2])))
+        if not isinstance(given, list) or "items" not in schema:
+            return 0
+        least, most = schema.get("minItems", 0), schema.get("maxItems", len(given))
+        return least <= len(given) <= most and all(may_be(x, schema["items"]) for x in given)
+
+    return max((item for item in schemas if may_be(given, item)), key=fit, default=None)
+
+
+def choices(schema: Schema) -> list[str]:
+    """Return the words that a kind takes, if it is a choice or has one."""
+    kinds = schema.get("anyOf", (schema,))
+    return [word for item in kinds for word in item.get("enum", ()) if isinstance(word, str)]
 
 
 def may_be(value: Any, schema: Schema) -> bool:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from kincompile.model import declared as kinds
+from kincompile.model.declared import declared, given
 
 if TYPE_CHECKING:
     import sympy
@@ -11,7 +13,7 @@ if TYPE_CHECKING:
     from kincompile.model.expressions import Scalar
 
 
-@dataclass(frozen=True, init=False)
+@declared(init=False)
 class Equation:
     """One or more free SymPy equations, each understood as ``expression = 0``.
 
@@ -25,9 +27,12 @@ class Equation:
         Whether their slope over time may jump: no acceleration is given there.
     """
 
-    name: str
-    expressions: tuple[Scalar | sympy.Eq, ...]
-    corners: bool = False
+    name: str = given(kinds.NAME, "Name of the equation.")
+    expressions: tuple[Scalar | sympy.Eq, ...] = given(
+        kinds.array(kinds.EXPRESSION, 1) | {"description": "a list of formulas"},
+        "What is zero, in coordinates, parameters and t.",
+    )
+    corners: bool = given(kinds.FLAG, "Whether their slope over time may jump.", default=False)
 
     def __init__(self, name: str, *expressions: Scalar | sympy.Eq, corners: bool = False) -> None:
         object.__setattr__(self, "name", name)

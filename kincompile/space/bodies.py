@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sized
 from dataclasses import field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kincompile.calculus.space import SpatialFrame
 from kincompile.errors import ModelError
@@ -53,6 +53,40 @@ SPATIAL = BodyKind(
 )
 
 
+_PLACE = kinds.components(3, words="[x, y, z]")
+_ROWS = kinds.components(3, kinds.components(3, words="[., ., .]"))
+
+
+@declared(repr=False)
+class Placed:
+    """A body in space as it is written: where it is, and how its axes are turned."""
+
+    name: str = given(kinds.NAME, "Name of the body.")
+    position: Scalars = given(
+        _PLACE, "Guess of its origin.", default=(0, 0, 0), unit="length", always=True
+    )
+    orientation: Any = given(
+        kinds.any_of(kinds.components(4, words="[e0, e1, e2, e3]"), _ROWS)
+        | {"description": "[e0, e1, e2, e3], or three rows of a matrix"},
+        "Euler parameters, or a rotation matrix.", default=None,
+    )  # fmt: skip
+    axis: Any = given(_PLACE, "Direction about which it is turned.", default=None, kw_only=True)
+    angle: Any = given(kinds.EXPRESSION, "By how much.", default=None, unit="rad", kw_only=True)
+    x: Any = given(_PLACE, "Direction of its xi axis.", default=None, kw_only=True)
+    y: Any = given(_PLACE, "Direction of its eta axis.", default=None, kw_only=True)
+    z: Any = given(_PLACE, "Direction of its zeta axis.", default=None, kw_only=True)
+    mass: Any = given(kinds.EXPRESSION, "Its mass.", default=None, kw_only=True)
+    inertia: Any = given(
+        kinds.any_of(kinds.components(3, words="[J_xi, J_eta, J_zeta]"), _ROWS)
+        | {"description": "[J_xi, J_eta, J_zeta], or three rows of a matrix"},
+        "Its inertia about the centre of mass.", default=None, kw_only=True,
+    )  # fmt: skip
+    centre: Scalars = given(
+        kinds.components(3, words="[xi, eta, zeta]"), "Centre of mass in the body's frame.",
+        default=(0, 0, 0), unit="length", kw_only=True,
+    )  # fmt: skip
+
+
 @declared(slots=True, repr=False)
 class SpatialBody(Body):
     """A rigid body in space: x, y, z [length] of its origin and Euler parameters e0 to e3.
@@ -60,15 +94,14 @@ class SpatialBody(Body):
     Made by `spatial.Mechanism.body`; the ground is `spatial.Mechanism.ground`.
     """
 
-    guess: Scalars = given(
-        kinds.components(7), "Start values for Newton's method.", default=SPATIAL.ground,
-        always=True,
-    )  # fmt: skip
-    centre: Scalars = given(
-        kinds.components(3), "Centre of mass in the body's frame.", default=(0, 0, 0),
-        unit="length", kw_only=True,
-    )  # fmt: skip
+    guess: Scalars = SPATIAL.ground
+    centre: Scalars = field(default=(0, 0, 0), kw_only=True)
     kind: BodyKind = field(default=SPATIAL, kw_only=True, repr=False)
+
+    def written(self) -> Placed:
+        """Return what a file has of it: Euler parameters, whichever way they were given."""
+        given = {"mass": self.mass, "inertia": self.inertia, "centre": self.centre}
+        return Placed(self.name, self.guess[:3], self.guess[3:], **given)
 
     @property
     def z(self) -> sympy.Expr:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar, cast
 
 from kincompile.calculus.space import i
-from kincompile.model.declared import declared
+from kincompile.model import declared as kinds
+from kincompile.model.declared import declared, given
 from kincompile.model.points import BodyPoint, PointCoordinate, rate
 
 if TYPE_CHECKING:
     import sympy
 
     from kincompile.calculus.symbols import Frame
+    from kincompile.model.expressions import Scalars
 
 
 class SpatialCoordinate(PointCoordinate):
@@ -46,6 +48,11 @@ class SpatialPoint(BodyPoint):
     It may stand where a joint wants a body and a point on it. A solution has its columns
     ``x_foot``, ``y_foot``, ``z_foot``, which are called ``foot.x`` and so on too, and their rates.
     """
+
+    local: Scalars = given(
+        kinds.components(3, words="[xi, eta, zeta]"), "Its place in the body's frame.",
+        unit="length",
+    )  # fmt: skip
 
     functions: ClassVar[tuple[type[PointCoordinate], ...]] = (point_x, point_y, point_z)
 

@@ -8,7 +8,8 @@ import numpy as np
 import kincompile as kc
 from docs.builders import fields as tables
 from docs.builders.places import DOCS
-from kincompile.files.file_format import FIELDS, IN_SPACE, PARTS
+from kincompile.files.dimensions import PLANE, SPACE
+from kincompile.files.file_format import equation_fields, fields_of
 from kincompile.files.safe_expressions import FUNCTIONS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "model_files.md").read_text(encoding="utf-8")
@@ -44,16 +45,11 @@ def test_that_the_file_in_space_moves(tmp_path):
     np.testing.assert_allclose(found["spin"] * end[2], rate, rtol=1e-11)
 
 
-def test_that_each_table_has_its_fields():
-    names = ("model", "analysis", "parameter", "body", "coordinate", "point", "output", "sketch")
-    given = (
-        *(FIELDS[table] for table in (*names, "sweep", "span")),
-        *IN_SPACE.values(),
-        *PARTS.values(),
-    )
-    for fields in given:
+def test_that_the_page_names_the_fields_of_the_file_and_of_equations():
+    """Those of its tables follow from their declarations."""
+    for fields in (fields_of("model", PLANE), fields_of("model", SPACE), equation_fields()):
         for field in fields:
-            assert f"`{field}`" in PAGE
+            assert f"`{field}`" in PAGE or f"`{field} = true`" in PAGE
 
 
 def test_that_the_tables_of_commands_follow_from_their_declarations(request):

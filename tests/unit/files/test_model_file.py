@@ -246,12 +246,13 @@ def test_that_a_motion_is_data_and_is_written_back(name, tmp_path):
 
 
 NO_MOTIONS = {
-    "{ points = [[0, 0], [1, 1]], law = 3 }": "motion sequence: law: 3 is not a list",
+    "{ points = [[0, 0], [1, 1]], law = 3 }": "law: expected a law of motion, or a list",
     "{ points = [[0, 0], [2, 1], [1, 0]] }": "motion sequence: times must rise, but 1 follows 2",
     "{ points = [[0, 0], [1]] }": "points, entry 2: expected [time, value], not a list of 1",
-    "{ points = 3 }": "points: expected a list, not 3",
+    '{ points = [[0, 0], [1, 1]], law = "cyclodial" }': "not 'cyclodial'; did you mean 'cycloidal'",
+    "{ points = 3 }": "points: expected a list of points [time, value], 2 or more, not 3",
     "{ points = [[0, 0], [1, 1]], laws = 3 }": "laws: there is no such field; did you mean 'law'",
-    "{ times = [0, 1], values = [0, 1] }": "motion table: a table of 2 rows is no curve",
+    "{ times = [0, 1], values = [0, 1, 2] }": "times: expected a list of three numbers or more",
     "{ times = [0, 1, 2] }": "no values; fields are: times, values, velocities",
     '{ times = [0, 1, 2], values = [0, 1, "t"] }': "values, entry 3: t is not a number",
     "{ }": "no points; fields are: points, law, ramp",

@@ -199,7 +199,7 @@ def changed(old, new):
         (changed("link = ", "rope = "), 10, "one of link, wheel, slider, slot, gear, drive"),
         (changed('length = "m"', 'length = "mm"'), 10, "column 1 of 'mm'"),
         (changed('length = "m"', "length = -1"), 10, "the length is -1"),
-        (changed('joints = "O A"', "joints = 3"), 10, "expected a text, not 3"),
+        (changed('joints = "O A"', "joints = 3"), 10, "expected a text in quotes, not 3"),
         (changed(', value = "2*pi*t"', ""), 17, "no value; fields are: drive, value, against"),
         (changed('drive = "crank"', 'drive = "cranc"'), 17, "drive of 'cranc'"),
         (changed('"E F G", EF', '"E F", EF'), 35, "no link has the joints G"),

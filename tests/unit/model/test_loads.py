@@ -220,7 +220,11 @@ def test_that_a_file_gives_what_python_does(tmp_path):
         ('body = "arm", torque', 'body = "leg", torque', "there is no body 'leg'"),
         ('[0, "-g"]', "3", r"gravity: expected \[x, y\]"),
         ("0.4, force", "-0.4, force", r"the free length is -0.4"),
-        ('values = [0, 1, 1, 0], over = "x_arm"', 'values = [0, 1], over = "x_arm"', "there are 4"),
+        (
+            'values = [0, 1, 1, 0], over = "x_arm"',
+            'values = [0, 1, 1], over = "x_arm"',
+            "there are 4",
+        ),
     ],
 )
 def test_that_a_file_says_what_is_wrong_and_where(tmp_path, old, new, message):

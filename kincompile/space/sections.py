@@ -1,0 +1,65 @@
+"""Tables of a file with ``space = 3`` that are others than in the plane."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from kincompile.model import declared as kind
+from kincompile.model import sections as plane
+from kincompile.model.declared import declared, given
+from kincompile.space.bodies import Placed
+from kincompile.space.points import SpatialPoint
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+_PLACE = kind.components(3, words="[x, y, z]")
+
+
+@declared
+class Drawing(plane.Drawing):
+    """A drawing in space: hardpoints, and the links that join them."""
+
+    ground: Mapping[str, Any] | None = given(
+        kind.named(_PLACE), "Joints of the ground.", default=None, unit="length"
+    )
+    joints: Mapping[str, Any] | None = given(
+        kind.named(_PLACE), "Joints, exactly.", default=None, unit="length"
+    )
+    hinges: Mapping[str, Any] | None = given(
+        kind.named(_PLACE), "Axes of hinges that are drawn as one joint.", default=None
+    )
+    parts: Sequence[Any] = given(
+        kind.tables("spatial_part"), "Links and others, in their order.", kw_only=True
+    )
+
+
+@declared
+class Slider(plane.Slider):
+    """A body that slides along a straight guide without turning."""
+
+    along: Any = given(
+        kind.any_of(kind.TEXT, _PLACE)
+        | {"description": "two joints in quotes, or a direction [x, y, z]"},
+        'Its guide: two joints of one link, `"C D"`, or a direction.',
+    )
+
+
+@declared
+class Rod:
+    """Two joints at a distance: a rod with a ball at either end."""
+
+    rod: str = given(kind.NAME, "Name of the constraint; a rod is no body.")
+    joints: str = given(kind.TEXT, "The two joints, which links have already.")
+    length: Any = given(
+        kind.VALUE, "Its length; without, it is as drawn.", default=None, unit="length"
+    )
+
+
+TABLES: Mapping[str, type] = {"body": Placed, "point": SpatialPoint, "sketch": Drawing}
+"""Tables that are others in the plane."""
+
+PARTS: Mapping[str, type] = {
+    "link": plane.Joined, "slider": Slider, "rod": Rod, "drive": plane.Driven,
+}  # fmt: skip
+"""Parts of a drawing: methods of `spatial.Sketch`, and their arguments in order."""
