@@ -20,11 +20,9 @@ import logging
 import warnings
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
+from kincompile import further
 from kincompile.emitters.emission import emit_program
 from kincompile.emitters.registry import TARGETS
 from kincompile.errors import (
@@ -41,9 +39,10 @@ from kincompile.names import listed
 from kincompile.structure.counting import counting_problem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
     from types import ModuleType
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from kincompile.emitters.target import Emitted
@@ -51,17 +50,9 @@ if TYPE_CHECKING:
     from kincompile.ir.program import Program
     from kincompile.ir.transmission import TransmissionCode
     from kincompile.model.system import ConstraintSystem
-    from kincompile.runtime.engine.code import Compiled, Dynamics, Kind, Place
     from kincompile.structure.report import Inspection
 
 LOG = logging.getLogger(__name__)
-
-LARGEST_INLINE = 300
-"""Coordinates up to which every constraint is written out."""
-
-LARGEST_REDUNDANT = 1000
-"""Coordinates up to which redundant equations are found, by dense matrices; beyond, there may be no
-more equations than coordinates."""
 
 
 def emit(
@@ -140,9 +131,9 @@ def emit(
             )
         code = _lowered(system, form)
         if sensitivities:
-            code = _sensitive(code.program, sensitivities)
+            code = further.sensitive(code.program, sensitivities)
         if dynamics:
-            code = _moving(code, system)
+            code = further.moving(code, system)
         emitted = emit_program(target, code)
         if target != "numpy" or not isinstance(code, InlineProgram):
             return emitted
@@ -181,7 +172,7 @@ def transmission_files(
     smaller, q = without_legs(loop.system, wanted, q)
     code = _lowered(smaller, "inline")
     assert isinstance(code, InlineProgram)
-    _require_small(code.program, "transmissions", "take")
+    further.require_small(code.program, "transmissions", "take")
     found = transmission_code(code, names, wanted, q.tolist())
     defaults = {x.name: float(x.default or 0.0) for x in code.program.parameters}
     first = [q[k] for k in found.free], [defaults[name] for name in names]
@@ -196,7 +187,7 @@ def _without_collector(system: ConstraintSystem) -> Iterator[None]:
     coordinates take 1.16 times as long with it. Up to 900 coordinates there is no difference.
     """
     was_enabled = gc.isenabled()
-    if len(system.coordinates) > LARGEST_INLINE:
+    if len(system.coordinates) > further.LARGEST_INLINE:
         gc.disable()
     try:
         yield
@@ -213,7 +204,7 @@ def _check_target(target: str, form: str | None) -> None:
 
 
 def _is_grouped(system: ConstraintSystem, form: str | None) -> bool:
-    return form == "grouped" or (form is None and len(system.coordinates) > LARGEST_INLINE)
+    return form == "grouped" or (form is None and len(system.coordinates) > further.LARGEST_INLINE)
 
 
 def _lowered(system: ConstraintSystem, form: str | None) -> InlineProgram | GroupedProgram:
@@ -225,7 +216,7 @@ def _lowered(system: ConstraintSystem, form: str | None) -> InlineProgram | Grou
     program = lower(system, share_equations=is_grouped)
     code = _grouped(program) if is_grouped else inline(program)
     n = len(system.coordinates)
-    if len(system.equations) <= n or n > LARGEST_REDUNDANT:
+    if len(system.equations) <= n or n > further.LARGEST_REDUNDANT:
         problem = counting_problem(system, code.pattern())
         return replace(code, program=replace(code.program, unsolvable=problem))
     return _with_redundancy(system, code)
@@ -285,36 +276,9 @@ def compile(  # noqa: A001 - the public name kc.compile
     with _without_collector(system):
         target = _loadable(target, system, form)
         code = _lowered(system, form)
-        compiled = _loaded(code, target)
-    compiled.makers.update(_makers(compiled, system, code, target))
+        compiled = further.loaded(code, target)
+    compiled.makers.update(further.makers_of(compiled, system, code, target))
     return remember_model(compiled.module, system)
-
-
-def _makers(
-    compiled: Compiled,
-    system: ConstraintSystem,
-    code: InlineProgram | GroupedProgram,
-    target: str,
-) -> dict[Kind[Any], Callable[..., Any]]:
-    """Return the compilers of further code of a mechanism, by kind of request."""
-    from kincompile.runtime.engine import code as kinds
-
-    makers: dict[Kind[Any], Callable[..., Any]] = {
-        kinds.POINTS: partial(_joint_points, system),
-        kinds.DRIVERS: lambda: system.drivers_at,
-    }
-    if len(system.coordinates) <= LARGEST_REDUNDANT:
-        makers[kinds.UNDRIVEN] = partial(_undriven, system)
-    if not isinstance(code, InlineProgram):  # that of a large mechanism is not worth its memory
-        return makers
-    makers[kinds.SENSITIVITIES] = partial(_sensitivities, code, compiled.module, target)
-    makers[kinds.SENSITIVE] = partial(_with_sensitivities, code.program)
-    if system.loads:
-        makers[kinds.FORCES] = partial(_forces, code, target)
-        makers[kinds.JOINTS] = partial(_joints, system)
-        makers[kinds.DYNAMICS] = partial(_dynamics, code, system, target)
-        makers[kinds.SLOPES] = partial(_slopes, compiled, code, target)
-    return makers
 
 
 def _loadable(target: str, system: ConstraintSystem, form: str | None) -> str:
@@ -332,122 +296,6 @@ def _loadable(target: str, system: ConstraintSystem, form: str | None) -> str:
     return target
 
 
-def _joints(system: ConstraintSystem) -> dict[str, tuple[str, ...]]:
-    """Return the bodies of each constraint, by its name."""
-    return {item.name: tuple(body.name for body in item.bodies) for item in system.constraints}
-
-
-def _joint_points(system: ConstraintSystem) -> Compiled:
-    """Return code whose outputs are the points of joints, for who asks for one of them."""
-    return _compiled(lower(system.observing(system.joint_points())), "numpy")
-
-
-def _undriven(system: ConstraintSystem) -> str:
-    """Return which drivers are missing where equations depend on others; "" if none are."""
-    from kincompile.ir.redundancy import undriven
-
-    return undriven(system, lower(system))
-
-
-def _sensitive(program: Program, names: Sequence[str]) -> InlineProgram:
-    """Return the program of a mechanism with its sensitivities, written out."""
-    from kincompile.ir.sensitive import with_sensitivities
-
-    _require_small(program, "sensitivities", "differentiate")
-    return inline(with_sensitivities(program, names))
-
-
-def _require_small(program: Program, what: str, do: str) -> None:
-    """Refuse a mechanism that is too large for what is written out whole."""
-    if len(program.coordinates) > LARGEST_INLINE:
-        raise UnsupportedError(
-            f"{program.name!r} has {len(program.coordinates)} coordinates, and {what} are "
-            f"compiled for up to {LARGEST_INLINE}: {do} a part of the mechanism."
-        )
-
-
-def _moving(code: InlineProgram | GroupedProgram, system: ConstraintSystem) -> InlineProgram:
-    """Return the program of a mechanism with its equations of motion, written out."""
-    from kincompile.ir.accelerations import with_motion
-
-    _require_small(code.program, "equations of motion", "simulate")
-    assert isinstance(code, InlineProgram)
-    return inline(with_motion(code, _dependent(code, system)[0]))
-
-
-def _with_sensitivities(program: Program, names: tuple[str, ...]) -> Compiled:
-    """Return the code of a mechanism with its sensitivities, for `kc.sensitivities`."""
-    return _loaded(_sensitive(program, names), "numpy")
-
-
-def _sensitivities(
-    code: InlineProgram,
-    module: ModuleType,
-    target: str,
-    names: tuple[str, ...],
-    of: tuple[str, ...],
-    second: bool,
-    is_near: bool,
-) -> Compiled | None:
-    """Return code whose outputs are derivatives of columns, for `kc.sensitivities`.
-
-    `is_near` where its pivots are to be those of the position at the start: what large mechanisms
-    in space need, whose code takes a C compiler minutes.
-    """
-    from kincompile.ir.implicit import observing_sensitivities
-
-    q = _position(module) if is_near else None
-    if is_near and q is None:
-        return None
-    near = None if q is None else q.tolist()
-    program = observing_sensitivities(code, names, of, second=second, near=near)
-    return None if program is None else _compiled(program, "numpy" if is_near else target)
-
-
-def _forces(code: InlineProgram, target: str, is_planned: bool) -> Compiled | None:
-    """Return code whose outputs are forces, for `kc.forces`."""
-    from kincompile.ir.forces import observing_forces
-
-    program = observing_forces(code, is_planned=is_planned)
-    return None if program is None else _compiled(program, target)
-
-
-def _dynamics(code: InlineProgram, system: ConstraintSystem, target: str) -> Dynamics:
-    """Return the compiled equations of motion, for `kc.simulate`."""
-    from kincompile.ir.accelerations import observing_accelerations, observing_corrections
-    from kincompile.runtime.engine.code import Dynamics
-
-    left_out, redundant, free = _dependent(code, system)
-    accelerations = _compiled(observing_accelerations(code, left_out), target)
-    corrections = _compiled(observing_corrections(code, left_out), target)
-    return Dynamics(accelerations, corrections, redundant, free)
-
-
-def _slopes(
-    compiled: Compiled, code: InlineProgram, target: str
-) -> tuple[Compiled, Sequence[Place], Mapping[Place, float]]:
-    """Return the code of the derivatives of accelerations, for implicit integrators."""
-    from kincompile.ir.accelerations import observing_slopes
-    from kincompile.runtime.engine.code import DYNAMICS
-
-    redundant = compiled.request(DYNAMICS).redundant
-    left_out = {compiled.equations.index(name) for name in redundant}
-    program, places, numbers = observing_slopes(code, left_out)
-    return _compiled(program, target), places, numbers
-
-
-def _dependent(
-    code: InlineProgram, system: ConstraintSystem
-) -> tuple[set[int], tuple[str, ...], tuple[str, ...]]:
-    """Return rows and names of equations that repeat others, and the coordinates that are free."""
-    from kincompile.ir.accelerations import require_masses
-    from kincompile.ir.redundancy import independence
-
-    require_masses(code)
-    redundant, free = independence(system, code.program)
-    return {system.equations.index(name) for name in redundant}, redundant, free
-
-
 def forces_program(system: ConstraintSystem) -> Program | None:
     """Return the program whose outputs are the forces of a mechanism along a motion, or None.
 
@@ -459,25 +307,6 @@ def forces_program(system: ConstraintSystem) -> Program | None:
         warnings.simplefilter("ignore", RedundantConstraintWarning)
         code = _lowered(system, "inline")
     return observing_forces(code) if isinstance(code, InlineProgram) else None
-
-
-def _compiled(program: Program, target: str) -> Compiled:
-    """Return the code of a program, as its module gives it."""
-    return _loaded(inline(program), target)
-
-
-def _loaded(code: InlineProgram | GroupedProgram, target: str) -> Compiled:
-    from kincompile.runtime.engine.code import code_of
-    from kincompile.runtime.load import from_source
-
-    # The NumPy module has the constants, the checks and the careful march of the compiled one.
-    emitted = emit_program("numpy", code)
-    module = from_source(emitted.source, code.program.name, emitted.arrays)
-    if target == "c":
-        from kincompile.runtime.native.module import make_native
-
-        module = make_native(module, emit_program("c", code).files)
-    return code_of(module)
 
 
 def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
@@ -520,15 +349,4 @@ def _assembled(model: Mechanism | ConstraintSystem) -> NDArray[np.float64] | Non
             module = compile(model)
         except KincompileError:
             return None
-    return _position(module)
-
-
-def _position(module: ModuleType) -> NDArray[np.float64] | None:
-    """Return the position of a module at the start, or None."""
-    from kincompile.runtime.solve import solve
-
-    try:
-        position = solve(module, 0.0).q[0]
-    except KincompileError:  # no equation has a value there
-        return None
-    return position if np.isfinite(position).all() else None
+    return further.position_of(module)

@@ -75,7 +75,7 @@ def _functions(
     has outputs in the place of inputs.
     """
     names, f = argument_names(value), reference.f
-    own = value if isinstance(value, Transmission) else getattr(value, "__self__", None)
+    own = getattr(value, "__self__", value)
     if not isinstance(own, Transmission) or names is None:
         choices = reference.arguments(quantity, names)
         return [from_function(quantity, value, reference, item) for item in choices]

@@ -7,18 +7,8 @@ from pathlib import Path
 import click
 
 import kincompile as kc
+from kincompile.cli import shared
 from kincompile.cli.motion import set_values
-from kincompile.cli.shared import (
-    end_unsolved,
-    output_option,
-    page_option,
-    print_data,
-    read_model,
-    require_output,
-    set_option,
-    table_options,
-    write_page,
-)
 from kincompile.errors import InputError
 from kincompile.model.tasks import Fit
 from kincompile.writing import write_atomically
@@ -28,10 +18,10 @@ ENDINGS = (".toml", ".json")
 
 @click.command("fit")
 @click.argument("model")
-@output_option("Model to write with the dimensions found: .toml or .json.", required=False)
-@page_option
-@set_option("parameter")
-@table_options(Fit)
+@shared.output_option("Model to write with the dimensions found: .toml or .json.", required=False)
+@shared.page_option
+@shared.set_option("parameter")
+@shared.table_options(Fit)
 @click.pass_context
 def command(
     context: click.Context,
@@ -55,16 +45,16 @@ def command(
     if output is not None:
         if Path(output).suffix not in ENDINGS:
             raise InputError(f"cannot write {output}: end its name in .toml or .json")
-        require_output(output, model, "the model itself")
-    mechanism = require_mechanism(read_model(model), "kincompile fit")
+        shared.require_output(output, model, "the model itself")
+    mechanism = require_mechanism(shared.read_model(model), "kincompile fit")
     given = read_fit(model, mechanism)
     given |= {name: x for name, x in options.items() if x is not None}
     found = kc.fit(mechanism, p=set_values(mechanism, values), **given)
-    print_data(f"{found}\n")
+    shared.print_data(f"{found}\n")
     if output is not None:
         text = found.model.to_json() if output.endswith(".json") else found.model.to_toml()
         click.echo(f"Wrote {write_atomically(output, text)}", err=True)
     if page is not None:
-        write_page(page, fit_page(found))
+        shared.write_page(page, fit_page(found))
     if not found.success:
-        end_unsolved(context, found.message)
+        shared.end_unsolved(context, found.message)

@@ -12,45 +12,12 @@ from enum import Enum
 from fractions import Fraction
 from typing import overload
 
-from kincompile.calculus.expressions import (
-    ZERO,
-    ZERO_VECTOR,
-    Angle,
-    Circular,
-    Dot,
-    Expression,
-    Norm,
-    Number,
-    Perpendicular,
-    Power,
-    Product,
-    ProfileFunction,
-    Root,
-    Rotated,
-    Scalar,
-    Scaled,
-    Sum,
-    Symbol,
-    TimeFunction,
-    TimesG,
-    Vector,
-    VectorSum,
-    cross,
-    dot,
-    perpendicular,
-    power_of,
-    product_of,
-    rotated,
-    scaled,
-    split_factor,
-    sum_of,
-    vector_sum,
-)
+from kincompile.calculus import expressions as ex
 
-Direction = Mapping[Expression, Expression]
+Direction = Mapping[ex.Expression, ex.Expression]
 """How each leaf changes; a leaf that is absent is held constant."""
 
-TIME = Symbol("t")
+TIME = ex.Symbol("t")
 """The key that stands for time in a direction."""
 
 
@@ -77,8 +44,8 @@ class Step:
     """One application of a rule."""
 
     rule: Rule
-    expression: Expression
-    derivative: Expression
+    expression: ex.Expression
+    derivative: ex.Expression
 
 
 Record = list[Step] | None
@@ -86,82 +53,86 @@ Record = list[Step] | None
 
 
 @overload
-def along(expression: Scalar, direction: Direction, record: Record = None) -> Scalar: ...
+def along(expression: ex.Scalar, direction: Direction, record: Record = None) -> ex.Scalar: ...
 @overload
-def along(expression: Vector, direction: Direction, record: Record = None) -> Vector: ...
+def along(expression: ex.Vector, direction: Direction, record: Record = None) -> ex.Vector: ...
 @overload
-def along(expression: Expression, direction: Direction, record: Record = None) -> Expression: ...
-def along(expression: Expression, direction: Direction, record: Record = None) -> Expression:
+def along(
+    expression: ex.Expression, direction: Direction, record: Record = None
+) -> ex.Expression: ...
+def along(expression: ex.Expression, direction: Direction, record: Record = None) -> ex.Expression:
     """Differentiate an expression along a direction.
 
     With ``{phi_i: 1}`` it is the partial derivative by phi_i, with ``{r_i: e_x}`` that by x_i; with
     the rates, ``{r_i: r_i_dot, phi_i: phi_i_dot, ...}``, it is Phi_q q_dot; a driver C(t) gives
     its next order where the direction holds the time.
     """
-    differentiate = _scalar if isinstance(expression, Scalar) else _vector
+    differentiate = _scalar if isinstance(expression, ex.Scalar) else _vector
     rule, result = differentiate(expression, direction, record)  # type: ignore[arg-type]
     if record is not None:
         record.append(Step(rule, expression, result))
     return result
 
 
-def _scalar(expression: Scalar, direction: Direction, record: Record) -> tuple[Rule, Scalar]:
+def _scalar(expression: ex.Scalar, direction: Direction, record: Record) -> tuple[Rule, ex.Scalar]:
     match expression:
-        case Sum(terms):
-            return Rule.SUM, sum_of(tuple(along(term, direction, record) for term in terms))
-        case Product(factors):
-            return Rule.PRODUCT, sum_of(
+        case ex.Sum(terms):
+            return Rule.SUM, ex.sum_of(tuple(along(term, direction, record) for term in terms))
+        case ex.Product(factors):
+            return Rule.PRODUCT, ex.sum_of(
                 tuple(
-                    product_of((*factors[:k], along(factor, direction, record), *factors[k + 1 :]))
+                    ex.product_of(
+                        (*factors[:k], along(factor, direction, record), *factors[k + 1 :])
+                    )
                     for k, factor in enumerate(factors)
                 )
             )
-        case Power(base, exponent):
-            outer = exponent * power_of(base, exponent - 1)
+        case ex.Power(base, exponent):
+            outer = exponent * ex.power_of(base, exponent - 1)
             return Rule.CHAIN, outer * along(base, direction, record)
-        case Dot(left, right) if left == right:
-            return Rule.PRODUCT, 2 * dot(left, along(right, direction, record))
-        case Dot(left, right):
-            return Rule.PRODUCT, dot(along(left, direction, record), right) + dot(
+        case ex.Dot(left, right) if left == right:
+            return Rule.PRODUCT, 2 * ex.dot(left, along(right, direction, record))
+        case ex.Dot(left, right):
+            return Rule.PRODUCT, ex.dot(along(left, direction, record), right) + ex.dot(
                 left, along(right, direction, record)
             )
-        case Norm(vector) if along(vector, direction) != ZERO_VECTOR:
-            return Rule.CHAIN, dot(vector, along(vector, direction, record)) * expression**-1
-        case Root(square):
-            half = Number(Fraction(1, 2))
+        case ex.Norm(vector) if along(vector, direction) != ex.ZERO_VECTOR:
+            return Rule.CHAIN, ex.dot(vector, along(vector, direction, record)) * expression**-1
+        case ex.Root(square):
+            half = ex.Number(Fraction(1, 2))
             return Rule.CHAIN, half * along(square, direction, record) * expression**-1
-        case Circular(name, argument):
+        case ex.Circular(name, argument):
             sign, other = (-1, "sin") if name == "cos" else (1, "cos")
             inner = along(argument, direction, record)
-            return Rule.CHAIN, sign * Circular(other, argument) * inner
-        case Angle(sine, cosine):
+            return Rule.CHAIN, sign * ex.Circular(other, argument) * inner
+        case ex.Angle(sine, cosine):
             by_sine, by_cosine = (along(item, direction, record) for item in (sine, cosine))
             turn = cosine * by_sine - sine * by_cosine
             return Rule.ANGLE, turn / (sine**2 + cosine**2)
-        case ProfileFunction(name, argument, order):
+        case ex.ProfileFunction(name, argument, order):
             inner = along(argument, direction, record)
-            return Rule.PROFILE, ProfileFunction(name, argument, order + 1) * inner
-        case TimeFunction(name, order) if TIME in direction:
-            return Rule.DRIVER, TimeFunction(name, order + 1)
+            return Rule.PROFILE, ex.ProfileFunction(name, argument, order + 1) * inner
+        case ex.TimeFunction(name, order) if TIME in direction:
+            return Rule.DRIVER, ex.TimeFunction(name, order + 1)
     change = direction.get(expression)
     if change is None:
-        return Rule.CONSTANT, ZERO
-    assert isinstance(change, Scalar)
+        return Rule.CONSTANT, ex.ZERO
+    assert isinstance(change, ex.Scalar)
     return Rule.COORDINATE, change
 
 
-def _vector(expression: Vector, direction: Direction, record: Record) -> tuple[Rule, Vector]:
+def _vector(expression: ex.Vector, direction: Direction, record: Record) -> tuple[Rule, ex.Vector]:
     match expression:
-        case VectorSum(terms):
-            return Rule.SUM, vector_sum(tuple(along(term, direction, record) for term in terms))
-        case Scaled(factor, vector):
-            return Rule.PRODUCT, vector_sum(
+        case ex.VectorSum(terms):
+            return Rule.SUM, ex.vector_sum(tuple(along(term, direction, record) for term in terms))
+        case ex.Scaled(factor, vector):
+            return Rule.PRODUCT, ex.vector_sum(
                 (
-                    scaled(along(factor, direction, record), vector),
-                    scaled(factor, along(vector, direction, record)),
+                    ex.scaled(along(factor, direction, record), vector),
+                    ex.scaled(factor, along(vector, direction, record)),
                 )
             )
-        case Rotated(rotation, vector, directions):
+        case ex.Rotated(rotation, vector, directions):
             rules = _ROTATION[rotation.letters]
             # A is of degree 2 in Euler parameters: its third derivative is zero.
             turning = rotation.coordinates if len(directions) < len(rules) else ()
@@ -169,39 +140,44 @@ def _vector(expression: Vector, direction: Direction, record: Record) -> tuple[R
             moved = along(vector, direction, record)
             name = rules[min(len(directions), len(rules) - 1)]
             if any(
-                isinstance(item, Scaled) and isinstance(item.vector, TimesG) for item in changes
+                isinstance(item, ex.Scaled) and isinstance(item.vector, ex.TimesG)
+                for item in changes
             ):
                 name = Rule.TURN
-            return name, vector_sum(
+            return name, ex.vector_sum(
                 (
-                    *(rotated(rotation, vector, (*directions, change)) for change in changes),
+                    *(ex.rotated(rotation, vector, (*directions, change)) for change in changes),
                     *(
-                        rotated(rotation, vector, (*directions[:k], change, *directions[k + 1 :]))
+                        ex.rotated(
+                            rotation, vector, (*directions[:k], change, *directions[k + 1 :])
+                        )
                         for k, item in enumerate(directions)
                         if (change := direction.get(item)) is not None
                     ),
-                    rotated(rotation, moved, directions),
+                    ex.rotated(rotation, moved, directions),
                 )
             )
-        case TimesG(p, vector, False):
+        case ex.TimesG(p, vector, False):
             by_p, by_vector = (along(item, direction, record) for item in (p, vector))
             pairs = (by_p, vector), (p, by_vector)
-            return Rule.PRODUCT, vector_sum(
-                tuple(TimesG(*pair) for pair in pairs if ZERO_VECTOR not in pair)
+            return Rule.PRODUCT, ex.vector_sum(
+                tuple(ex.TimesG(*pair) for pair in pairs if ex.ZERO_VECTOR not in pair)
             )
-        case TimesG(p, vector, True) if p in direction:
-            factor, change = split_factor(along(p, direction))
-            assert isinstance(change, TimesG), "p changes by a small rotation"
-            number, turn = split_factor(cross(change.vector, vector))
-            back = dot(change.vector, vector) * p
-            onward = ZERO_VECTOR if turn == ZERO_VECTOR else TimesG(p, turn, is_transposed=True)
+        case ex.TimesG(p, vector, True) if p in direction:
+            factor, change = ex.split_factor(along(p, direction))
+            assert isinstance(change, ex.TimesG), "p changes by a small rotation"
+            number, turn = ex.split_factor(ex.cross(change.vector, vector))
+            back = ex.dot(change.vector, vector) * p
+            onward = (
+                ex.ZERO_VECTOR if turn == ex.ZERO_VECTOR else ex.TimesG(p, turn, is_transposed=True)
+            )
             return Rule.TURN, factor * (number * onward - back)
-        case Perpendicular(vector):
-            return Rule.CONSTANT, perpendicular(along(vector, direction, record))
+        case ex.Perpendicular(vector):
+            return Rule.CONSTANT, ex.perpendicular(along(vector, direction, record))
     change = direction.get(expression)
     if change is None:
-        return Rule.CONSTANT, ZERO_VECTOR
-    assert isinstance(change, Vector)
+        return Rule.CONSTANT, ex.ZERO_VECTOR
+    assert isinstance(change, ex.Vector)
     return Rule.COORDINATE, change
 
 

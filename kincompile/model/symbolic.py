@@ -13,16 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from fractions import Fraction
 
+    from kincompile.calculus import expressions as ex
     from kincompile.calculus.expand import Expansion
-    from kincompile.calculus.expressions import (
-        Components,
-        ProfileFunction,
-        Rotation,
-        Symbol,
-        TimeFunction,
-        Value,
-        VectorSymbol,
-    )
     from kincompile.calculus.symbols import CoordinateSymbol
     from kincompile.calculus.template import Template
 
@@ -64,21 +56,21 @@ class SymbolicEnvironment:
             self._motion[item] = tuple(_symbol(name, value) for name, value in own)
             self._motion[item_rate] = tuple(_symbol(name and rate(name)) for name, _ in own)
 
-    def number(self, value: Fraction) -> Value:
+    def number(self, value: Fraction) -> ex.Value:
         """Return an exact number."""
         return sympy.Rational(value.numerator, value.denominator)
 
-    def pi(self) -> Value:
+    def pi(self) -> ex.Value:
         """Return pi."""
         return sympy.pi
 
-    def symbol(self, symbol: Symbol) -> Value:
+    def symbol(self, symbol: ex.Symbol) -> ex.Value:
         """Return a coordinate, a rate or a scalar attribute."""
         if symbol in self._motion:
             return self._motion[symbol][0]
         return as_sympy(self._bound.scalars[symbol.name])
 
-    def vector(self, symbol: VectorSymbol) -> Components:
+    def vector(self, symbol: ex.VectorSymbol) -> ex.Components:
         """Return a position, a velocity or a body-fixed point.
 
         A vector that is given by name among the points is that, also where it is a rate: omega'.
@@ -87,20 +79,20 @@ class SymbolicEnvironment:
             return self._motion[symbol]
         return tuple(as_sympy(value) for value in self._bound.points[symbol.name])
 
-    def time_function(self, function: TimeFunction) -> Value:
+    def time_function(self, function: ex.TimeFunction) -> ex.Value:
         """Return C(t) or one of its derivatives."""
         return as_sympy(self._bound.scalars[function.name]).diff(t, function.order)
 
-    def profile(self, profile: ProfileFunction) -> Value:
+    def profile(self, profile: ex.ProfileFunction) -> ex.Value:
         """Return rho(alpha) or one of its derivatives at the contact parameter."""
         rho = self._bound.profiles[profile.name].diff(alpha, profile.order)
         return rho.subs(alpha, self.symbol(profile.argument))
 
-    def entries(self, rotation: Rotation, expand: Expansion) -> Components:
+    def entries(self, rotation: ex.Rotation, expand: Expansion) -> ex.Components:
         """Return the numbers that all vectors share that a rotation turns."""
         return expand.entries(rotation)
 
-    def call(self, function: str, *values: Value) -> Value:
+    def call(self, function: str, *values: ex.Value) -> ex.Value:
         """Return an elementary function."""
         return getattr(sympy, function)(*values)
 

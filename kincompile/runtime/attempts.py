@@ -13,18 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import (
-    ASSEMBLES,
-    BEND,
-    FALLING,
-    LARGEST_ANGLE,
-    MOST_MIRRORED,
-    SHORTEST_STEP,
-    STATIONARY,
-    SUFFICIENT,
-    TOO_STEEP,
-    probe_of,
-)
+from kincompile import criteria
 from kincompile.runtime.engine.linear import Planned, stacked
 from kincompile.runtime.engine.scales import weights_of
 from kincompile.runtime.start import mirrored, restart_points
@@ -84,7 +73,7 @@ def other_sides(equations: Problem, sets: Array, t: float, q: Array) -> Array:
     """Return `start.other_side` of N positions (n, N), with parameters (N, k)."""
     n, found, run = len(q), np.full_like(q, np.nan), equations.code.mirror
     some, most = np.flatnonzero(np.isfinite(q).all(axis=0)), max(1, MOST_NUMBERS // n**2)
-    for first in range(0, some.size if n <= MOST_MIRRORED else 0, most):
+    for first in range(0, some.size if n <= criteria.MOST_MIRRORED else 0, most):
         own = some[first : first + most]
         here, p = q[:, own], sets[own]
         if run is not None and n <= LARGEST_DENSE:
@@ -167,11 +156,13 @@ class _Attempts:
         self._code, self._pattern, self._t, self._p = code, pattern, t, sets
         self._reference = equations.reference[:, np.newaxis]
         self._limit = np.broadcast_to(equations.limit, len(pattern.rows_of))[:, np.newaxis]
-        self._most = self._reference * np.where(self._code.angular, LARGEST_ANGLE, 1.0)[:, None]
+        self._most = (
+            self._reference * np.where(self._code.angular, criteria.LARGEST_ANGLE, 1.0)[:, None]
+        )
         self._scales = self._reference[pattern.columns]
         # (m, nnz): adds up what the entries of each row contribute.
         self._add = (np.arange(self._limit.size)[:, None] == pattern.rows) * self._scales.T
-        generic = q + self._reference * probe_of(len(q))[:, np.newaxis]
+        generic = q + self._reference * criteria.probe_of(len(q))[:, np.newaxis]
         terms = self._add @ np.abs(self._evaluate(generic, np.arange(t.size))[1])
         self._magnitude = np.where(np.isfinite(terms), terms, equations.magnitude[:, np.newaxis])
 
@@ -204,9 +195,9 @@ class _Attempts:
             weights = weights_of(np.maximum(self._magnitude[:, moving], terms))
             residual = weights * Phi
             before = _norms(residual)
-            known = (before > ASSEMBLES) & (sizes.max(axis=0) < TOO_STEEP)
+            known = (before > criteria.ASSEMBLES) & (sizes.max(axis=0) < criteria.TOO_STEEP)
             far[moving[~known]] = False
-            known &= before < FALLING * earlier[0, moving]
+            known &= before < criteria.FALLING * earlier[0, moving]
             earlier[:, moving] = np.vstack((earlier[1:, moving], before))
             entries = weights[self._pattern.rows] * Phi_q * self._scales
             moving, weights, residual, before, entries = _some(
@@ -215,7 +206,7 @@ class _Attempts:
             direction, falls = _directions(self._pattern, entries, residual, before)
             sane = np.isfinite(falls)
             far[moving[~sane]] = False
-            sane &= falls > STATIONARY
+            sane &= falls > criteria.STATIONARY
             moving, direction, weights, before = _some(sane, moving, direction, weights, before)
             if not moving.size:
                 break
@@ -238,12 +229,12 @@ class _Attempts:
             trial = q[:, moving[left]] + part[left] * correction[:, left]
             here = self._evaluate(trial, moving[left])
             after = _norms(weights[:, left] * here[0])
-            lower = after <= (1 - SUFFICIENT * part[left]) * before[left]
+            lower = after <= (1 - criteria.SUFFICIENT * part[left]) * before[left]
             done = left[lower]
             q[:, moving[done]], moved[done] = trial[:, lower], True
             Phi[:, done], Phi_q[:, done] = here[0][:, lower], here[1][:, lower]
             part[left] /= 2
-            left = left[~lower & (part[left] >= SHORTEST_STEP)]
+            left = left[~lower & (part[left] >= criteria.SHORTEST_STEP)]
         return moved, Phi, Phi_q
 
 
@@ -263,7 +254,7 @@ def _directions(
         for k in among:
             np.multiply(entries[k], right, out=part)
             sides[pattern.columns[k]] -= part
-    normal[pattern.diagonal] += BEND * np.minimum(1.0, size)
+    normal[pattern.diagonal] += criteria.BEND * np.minimum(1.0, size)
     found, factors = sides.copy(), normal.copy()
     for pivot, own, below, updates in pattern.order:
         for i, place in below:

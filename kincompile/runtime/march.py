@@ -19,38 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import (
-    ALLOWED_PART,
-    BEFORE,
-    BEFORE_LOCK_UP,
-    BEYOND,
-    CLOSE,
-    GROWN,
-    GROWTH,
-    KINK,
-    KINK_UNSEEN,
-    LARGE_ERROR,
-    LARGEST_DISPLACEMENT,
-    LAST_COARSE_CORRECTION,
-    LAST_CORRECTION,
-    LEFT,
-    MAX_CORRECTIONS,
-    MAX_SUBSTEPS,
-    NEARLY_SINGULAR,
-    PATIENCE,
-    RESIDUAL_FACTOR,
-    ROUNDING,
-    SAME_DETERMINANT,
-    SHORTER,
-    SINGULAR_SENSITIVITY,
-    SMALL_ERROR,
-    SMALLEST_PART,
-    SMOOTH,
-    SMOOTH_UNSEEN,
-    SOON,
-    TINY,
-    TOO_NEAR,
-)
+from kincompile import criteria
 from kincompile.runtime.engine.linear import Dense, Planned, unsolvable
 from kincompile.runtime.engine.scales import Point, column, within
 from kincompile.runtime.problem import iterate, plain_step, problem
@@ -125,9 +94,9 @@ class March:
     def __init__(self, equations: Problem, engine: Linear, tolerance: float) -> None:
         self.equations, self.engine = equations, engine
         self._asked, self.tolerance = tolerance, max(tolerance, equations.floor)
-        self._residual = max(RESIDUAL_FACTOR * tolerance, ROUNDING)
+        self._residual = max(criteria.RESIDUAL_FACTOR * tolerance, criteria.ROUNDING)
         # Factors of Phi_q a rounding error away serve the rates; a dense matrix has none to save.
-        self._tight = 0.0 if isinstance(engine, Dense) else min(tolerance, LAST_CORRECTION)
+        self._tight = 0.0 if isinstance(engine, Dense) else min(tolerance, criteria.LAST_CORRECTION)
         self._step = partial(plain_step, tight=self._tight) if self._tight else plain_step
 
     @classmethod
@@ -154,7 +123,7 @@ class March:
         Good is what did so, and was moved by less than `reach`, in scales, in the first iteration.
         """
         equations, engine = self.equations, self.engine
-        rounding = ROUNDING * np.abs(q[:, [0, -1]]).max(axis=1)
+        rounding = criteria.ROUNDING * np.abs(q[:, [0, -1]]).max(axis=1)
         loose, tight = (x * equations.reference + rounding for x in (self.tolerance, self._tight))
         done, iterations = np.zeros(q.shape[1], bool), np.zeros(q.shape[1], int)
         good: Any = True
@@ -191,7 +160,7 @@ class March:
         determinants = engine.determinants(point, point)
         if before is not None and not isinstance(engine, Dense):
             sensitivity, probed = before.sensitivity, before.probed
-        if probed is None or not (np.abs(determinants) >= SAME_DETERMINANT * probed).all():
+        if probed is None or not (np.abs(determinants) >= criteria.SAME_DETERMINANT * probed).all():
             probed = np.abs(determinants)
             extra_rhs = column(equations.magnitude * equations.probe, point.q)
             rates = engine.solved(equations, point, extra_rhs)
@@ -200,7 +169,7 @@ class March:
             rates = engine.solved(equations, point)
         finite = np.isfinite((rates.q_dot + rates.q_ddot).sum(axis=0))
         checks = (
-            (sensitivity < SINGULAR_SENSITIVITY, Status.SINGULAR),
+            (sensitivity < criteria.SINGULAR_SENSITIVITY, Status.SINGULAR),
             (finite, Status.NOT_FINITE),
             (rates.are_met, Status.SINGULAR),
         )
@@ -228,7 +197,9 @@ class March:
         """
         error = self.equations.extent(q - predicted)
         movement = self.equations.extent(predicted - state.point.q)
-        allowed = np.minimum(LARGE_ERROR, np.maximum(SMALL_ERROR, ALLOWED_PART * movement))
+        allowed = np.minimum(
+            criteria.LARGE_ERROR, np.maximum(criteria.SMALL_ERROR, criteria.ALLOWED_PART * movement)
+        )
         return error, error <= allowed
 
     def follows(self, state: State, following: State, error: Any) -> Checks:
@@ -243,7 +214,9 @@ class March:
         kink = abs(h) * self.equations.extent(following.q_dot - expected)
         signs = np.sign(self.engine.determinants(following.point, state.point))
         same = (signs == np.sign(state.determinants)).all(axis=0)
-        smooth = (following.sensitivity <= NEARLY_SINGULAR) | (kink <= KINK * error + SMOOTH)
+        smooth = (following.sensitivity <= criteria.NEARLY_SINGULAR) | (
+            kink <= criteria.KINK * error + criteria.SMOOTH
+        )
         return (same, Status.SINGULAR), (smooth, Status.SINGULAR)
 
     def step(self, state: State, t: float, most: int) -> Outcome:
@@ -272,7 +245,7 @@ class March:
         following, checks = self.complete(found.point, state)
         error, near = self.error(state, found.point.q, predicted)
         checks += self.follows(state, following, error)
-        is_far = following.sensitivity <= TOO_NEAR
+        is_far = following.sensitivity <= criteria.TOO_NEAR
         return following, all_hold(found.good & near & is_far, checks), found.iterations
 
     def solve_together(self, t: Array, states: Array, residual: Array, smallest: Array) -> Any:
@@ -283,7 +256,7 @@ class March:
         """
         engine, (q, q_dot, q_ddot) = self.engine, states
         assert isinstance(engine, Planned)
-        found = self.correct_together(q, t, CORRECTIONS_ON_GRID, LARGEST_DISPLACEMENT)
+        found = self.correct_together(q, t, CORRECTIONS_ON_GRID, criteria.LARGEST_DISPLACEMENT)
         point, good = found.point, found.good
         residual[:] = largest(point.Phi, t.size)
         rates = engine.rates(point, None, (q_dot, q_ddot))
@@ -299,9 +272,9 @@ class March:
         """
         forward = t - state.t
         speed, left = self.until_lock_up(state, forward)
-        grown = speed >= GROWN * self.equations.extent(begin.q_dot)
-        before = np.abs(forward) - left > BEFORE_LOCK_UP * np.abs(t - begin.t)
-        ends = (left <= LEFT * smallest) & grown & before
+        grown = speed >= criteria.GROWN * self.equations.extent(begin.q_dot)
+        before = np.abs(forward) - left > criteria.BEFORE_LOCK_UP * np.abs(t - begin.t)
+        ends = (left <= criteria.LEFT * smallest) & grown & before
         if ends.any():
             there = self.engine.evaluate(state.point.q, t).Phi
             ends &= np.isfinite(sum(row for row in there) + np.zeros(speed.shape))
@@ -317,16 +290,16 @@ class March:
         if self.equations.code.redundant:
             return np.zeros(smallest.shape, dtype=bool)
         pace = self.time_of(state)
-        ahead = np.maximum(BEYOND * pace, LEFT * smallest)
+        ahead = np.maximum(criteria.BEYOND * pace, criteria.LEFT * smallest)
         forward = np.copysign(ahead, t - state.t)
         _, left = self.until_lock_up(state, forward)
         predicted = self.predict(state, state.t + forward)
-        found = self.correct_together(predicted.copy(), state.t + forward, MAX_CORRECTIONS)
+        found = self.correct_together(predicted.copy(), state.t + forward, criteria.MAX_CORRECTIONS)
         beyond, checks = self.complete(found.point)
         error, near = self.error(state, found.point.q, predicted)
         _, smooth = self.follows(state, beyond, error)
-        good = found.good & near & (state.sensitivity > CLOSE * TOO_NEAR)
-        good &= (2 * left < ahead) | (left > SOON * pace)
+        good = found.good & near & (state.sensitivity > criteria.CLOSE * criteria.TOO_NEAR)
+        good &= (2 * left < ahead) | (left > criteria.SOON * pace)
         return all_hold(good, (*checks, smooth))
 
     def until_lock_up(self, state: State, forward: Any) -> tuple[Array, Array]:
@@ -344,15 +317,15 @@ class March:
     def pace(self, state: State, forward: Any, step: Array, good: Any, smallest: Any) -> Array:
         """Return the sizes of a batch's next steps, after those to states that were good or not."""
         _, until = self.until_lock_up(state, forward)
-        least = np.maximum(np.abs(step) / SHORTER, np.where(good, 2 * smallest, 0.0))
-        longer = np.abs(step) * np.where(good, GROWTH, 0.5)
-        return np.asarray(np.minimum(longer, np.maximum(BEFORE * until, least)))
+        least = np.maximum(np.abs(step) / criteria.SHORTER, np.where(good, 2 * smallest, 0.0))
+        longer = np.abs(step) * np.where(good, criteria.GROWTH, 0.5)
+        return np.asarray(np.minimum(longer, np.maximum(criteria.BEFORE * until, least)))
 
     def time_of(self, state: State) -> Any:
         """Return the time in which something moves as far as its scale, large at rest."""
         reference = column(self.equations.reference, state.q_dot)
         speed, growth = ((np.abs(x) / reference).max(axis=0) for x in (state.q_dot, state.q_ddot))
-        return 1 / np.maximum(np.maximum(speed, np.sqrt(growth)), TINY)
+        return 1 / np.maximum(np.maximum(speed, np.sqrt(growth)), criteria.TINY)
 
     def advance(
         self, state: State, t: float, most: int, alive: Callable[[], object] = bool
@@ -363,16 +336,16 @@ class March:
         are many sub-steps, `alive` is called now and then.
         """
         step, iterations, wait = t - state.t, 0, 0
-        smallest = min(abs(step), self.time_of(state)) * SMALLEST_PART
+        smallest = min(abs(step), self.time_of(state)) * criteria.SMALLEST_PART
         status = Status.NOT_CONVERGED
-        for count in range(MAX_SUBSTEPS):
+        for count in range(criteria.MAX_SUBSTEPS):
             if count % SIGN_OF_LIFE == SIGN_OF_LIFE - 1:
                 alive()
             whole = abs(step) >= abs(t - state.t)
             outcome = self.step(state, t if whole else state.t + step, most)
             iterations += outcome.iterations
             # Steps may move away from a near-singular state, but not closer to the singularity.
-            too_near = max(TOO_NEAR, state.sensitivity)
+            too_near = max(criteria.TOO_NEAR, state.sensitivity)
             near = outcome.state is not None and outcome.state.sensitivity > too_near
             status = Status.SINGULAR if near and not whole else outcome.status
             if whole and outcome.position:
@@ -384,7 +357,7 @@ class March:
             elif abs(step) <= smallest:
                 break
             else:
-                step, wait = step / 2, PATIENCE
+                step, wait = step / 2, criteria.PATIENCE
         else:
             return Outcome(Status.NOT_CONVERGED, iterations, state, exhausted=True)
         return Outcome(status, iterations, state)
@@ -440,11 +413,11 @@ def coarse_step(
         x + h * (v + half * a) for x, v, a in zip(node.q, node.q_dot, node.q_ddot, strict=True)
     ]
     q: Any = predicted
-    for _ in range(MAX_CORRECTIONS):
+    for _ in range(criteria.MAX_CORRECTIONS):
         point = engine.evaluate(q, t)
         correction = engine.solve(point, point.Phi)
         q = list(map(sub, q, correction))
-        if max(map(abs, map(mul, correction, per_scale))) <= LAST_COARSE_CORRECTION:
+        if max(map(abs, map(mul, correction, per_scale))) <= criteria.LAST_COARSE_CORRECTION:
             break
     else:
         return None
@@ -458,6 +431,6 @@ def coarse_step(
     error = max(map(abs, map(mul, map(sub, q, predicted), per_scale)))
     rates = zip(q_dot, node.q_dot, node.q_ddot, per_scale, strict=True)
     kink = abs(h) * max([abs(w - v - h * a) * s for w, v, a, s in rates])
-    if kink > KINK_UNSEEN * (error + SMOOTH_UNSEEN):
+    if kink > criteria.KINK_UNSEEN * (error + criteria.SMOOTH_UNSEEN):
         return None
     return Node(index, q, q_dot, q_ddot, determinants), error

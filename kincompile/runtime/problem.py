@@ -22,22 +22,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from kincompile.criteria import (
-    BEND,
-    FARTHEST,
-    LARGEST_ANGLE,
-    MAX_SHORTEST,
-    RANK,
-    RESIDUAL_FACTOR,
-    ROUNDING,
-    SHORTEST_STEP,
-    STEEP,
-    SUFFICIENT,
-    TOLERANCE,
-    probe_of,
-    rounded,
-    size_of,
-)
+from kincompile import criteria
 from kincompile.runtime.engine.linear import Dense, Sparse, unsolvable
 from kincompile.runtime.engine.scales import Scales, converges_linearly, norm, weights_of
 from kincompile.runtime.status import Status
@@ -98,23 +83,23 @@ def problem(
         values = point.Phi_q
         return point.Phi, values if values.ndim == 1 else values[pattern[:, 0], pattern[:, 1]]
 
-    size = float(rounded(size_of(entries, pattern, angular, q))) or 1.0
+    size = float(criteria.rounded(criteria.size_of(entries, pattern, angular, q))) or 1.0
     reference = np.where(angular, 1.0, size)
     if isinstance(engine, Sparse):
         engine.reference = reference
-    place, probe = np.minimum(np.abs(q), FARTHEST * reference), probe_of(m)
-    floor = float(ROUNDING * (place[~angular] / size).max(initial=0.0))
+    place, probe = np.minimum(np.abs(q), criteria.FARTHEST * reference), criteria.probe_of(m)
+    floor = float(criteria.ROUNDING * (place[~angular] / size).max(initial=0.0))
     none = np.zeros(m)
     equations = Problem(
         code=code, engine=engine, p=p, angular=angular, size=size, reference=reference,
         place=place, floor=floor, probe=probe, magnitude=none, noise=none,
     )  # fmt: skip
-    generic = equations.at(q + reference * probe_of(q.size), t)
+    generic = equations.at(q + reference * criteria.probe_of(q.size), t)
     if generic is not None and np.isfinite(generic.Phi_q).all():
-        equations.magnitude = rounded(equations.terms(generic, reference))
+        equations.magnitude = criteria.rounded(equations.terms(generic, reference))
         here = equations.terms(generic, reference + equations.place)
-        equations.noise = ROUNDING * here
-        equations.limit = np.where(here > 0, STEEP * here, np.inf)
+        equations.noise = criteria.ROUNDING * here
+        equations.limit = np.where(here > 0, criteria.STEEP * here, np.inf)
     return equations
 
 
@@ -178,7 +163,7 @@ def iterate(
             break
     else:
         if converges_linearly(attempt.corrections) and equations.holds(
-            attempt.last, RESIDUAL_FACTOR * tolerance
+            attempt.last, criteria.RESIDUAL_FACTOR * tolerance
         ):
             attempt.status = Status.SINGULAR
     return attempt
@@ -201,7 +186,7 @@ def plain_step(
 def nearest(equations: Problem, t: float, guess: Array, held: Sequence[int] = ()) -> Attempt:
     """Run it by shortest steps; coordinates of the numbers `held` stay as they are in the guess."""
     step = partial(shortest_step, held=held)
-    return iterate(equations, t, guess, TOLERANCE, MAX_SHORTEST, step)
+    return iterate(equations, t, guess, criteria.TOLERANCE, criteria.MAX_SHORTEST, step)
 
 
 def shortest_step(
@@ -213,7 +198,7 @@ def shortest_step(
         matrix[:, held] = 0.0
     if not np.isfinite(matrix).all():  # LAPACK would say so on the terminal
         return Status.NOT_FINITE
-    change = np.linalg.lstsq(matrix, equations.weights() * point.Phi, rcond=RANK)[0]
+    change = np.linalg.lstsq(matrix, equations.weights() * point.Phi, rcond=criteria.RANK)[0]
     change *= equations.reference / max(1.0, float(np.abs(change).max(initial=0.0)))
     following = equations.at(point.q - change, t)
     return Status.NOT_FINITE if following is None else (following, norm(change))
@@ -227,11 +212,11 @@ def safeguarded_step(equations: Problem, t: float, point: Point) -> tuple[Point,
         return Status.NOT_FINITE
     before = norm(weights * point.Phi)
     part = _clamp(equations, point, correction)
-    while part >= SHORTEST_STEP:
+    while part >= criteria.SHORTEST_STEP:
         following = equations.at(point.q + part * correction, t)
         if following is not None:
             after = norm(weights * following.Phi)
-            if after <= (1 - SUFFICIENT * part) * before or after <= ROUNDING:
+            if after <= (1 - criteria.SUFFICIENT * part) * before or after <= criteria.ROUNDING:
                 return following, part * norm(correction)
         part /= 2
     return Status.NOT_CONVERGED
@@ -248,7 +233,7 @@ def _direction(equations: Problem, point: Point, weights: Array) -> Array | None
         return correction if np.isfinite(correction).all() else None
     scale = equations.reference
     residual = weights * point.Phi
-    bend = math.sqrt(BEND * min(1.0, norm(residual)))
+    bend = math.sqrt(criteria.BEND * min(1.0, norm(residual)))
     matrix = np.vstack((weights[:, np.newaxis] * point.Phi_q * scale, bend * np.eye(scale.size)))
     sides = np.concatenate((-residual, np.zeros_like(scale)))
     if not np.isfinite(matrix).all():  # LAPACK would say so on the terminal
@@ -262,5 +247,5 @@ def _direction(equations: Problem, point: Point, weights: Array) -> Array | None
 
 def _clamp(equations: Problem, point: Point, correction: Array) -> float:
     """Give the part of a correction that moves angles and lengths no further than is sensible."""
-    limits = equations.reference * np.where(equations.angular, LARGEST_ANGLE, 1.0)
+    limits = equations.reference * np.where(equations.angular, criteria.LARGEST_ANGLE, 1.0)
     return min(1.0, 1.0 / float(np.max(np.abs(correction) / limits, initial=0.0) or 1.0))

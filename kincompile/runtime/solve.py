@@ -20,15 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import (
-    CORNER,
-    LATE,
-    MAX_ITERATIONS,
-    MAX_SUBSTEPS,
-    SAME_TIME,
-    TOLERANCE,
-    ZERO,
-)
+from kincompile import criteria
 from kincompile.errors import (
     AssemblyWarning,
     BranchSwitchWarning,
@@ -91,8 +83,8 @@ WORDS = {
     "not assembled": f"{CANNOT_BE} at this time (change lengths, or what the drivers demand), or "
     "the guess is too far away (give one nearer to the assembled mechanism; kc.assemblies(module) "
     "looks for positions).",
-    "exhausted": f"Between these two times {MAX_SUBSTEPS:,} steps were not enough: ask for more "
-    "times.",
+    "exhausted": f"Between these two times {criteria.MAX_SUBSTEPS:,} steps were not enough: ask "
+    "for more times.",
     "found": "The position there was found.",
     "jumps": "A position exists at that time, but the motion does not lead there continuously.",
 }
@@ -108,8 +100,8 @@ def solve(
     p: Values = None,
     guess: Values = None,
     *,
-    tolerance: float = TOLERANCE,
-    max_iterations: int = MAX_ITERATIONS,
+    tolerance: float = criteria.TOLERANCE,
+    max_iterations: int = criteria.MAX_ITERATIONS,
     method: str | None = None,
     through: str | None = None,
     assembly: int | None = None,
@@ -207,7 +199,7 @@ def solve_sets(
 
     So the chunks of a sweep are on one branch, whichever sets they have.
     """
-    limits = TOLERANCE, MAX_ITERATIONS
+    limits = criteria.TOLERANCE, criteria.MAX_ITERATIONS
     given = (module, t, sets[:, np.newaxis], guess, *limits, None, through, False)
     return _solved(given, None, p, None)
 
@@ -301,12 +293,12 @@ def _corners(inputs: Inputs, p: Array) -> Mask:
             before, after = (code.nu(q, times + side * reach, p) for side in (-1, 1))
             largest = np.fmax(largest, np.fmax.reduce(np.fmax(np.abs(before), np.abs(after))))
             jumps.append(np.abs(after - before))
-    return np.asarray((np.concatenate(jumps) > CORNER * largest).any(axis=1))
+    return np.asarray((np.concatenate(jumps) > criteria.CORNER * largest).any(axis=1))
 
 
 def _reach(t: Array) -> float:
     """Return how far two times may be apart that differ by rounding alone."""
-    return SAME_TIME * float(np.abs(t).max())
+    return criteria.SAME_TIME * float(np.abs(t).max())
 
 
 def finite(solution: Solution) -> Solution:
@@ -433,7 +425,7 @@ def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str
     general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
     if events and outcome.state is not None:
         event, end = events[-1], outcome.state.t
-        if abs(event.t - end) + abs(event.t - t) <= abs(t - end) + LATE:
+        if abs(event.t - end) + abs(event.t - t) <= abs(t - end) + criteria.LATE:
             general = event.message
     return f"{general} {asked}".rstrip()
 
@@ -451,7 +443,7 @@ def _unmet(inputs: Inputs, point: Point) -> str:
     """Say by how much which equations are missed at the best position, and where its bodies are."""
     sizes = np.abs(point.Phi)
     order = np.argsort(-sizes, kind="stable")[:NAMED_EQUATIONS]
-    rows = [row for row in order.tolist() if sizes[row] > ZERO * sizes[order[0]]]
+    rows = [row for row in order.tolist() if sizes[row] > criteria.ZERO * sizes[order[0]]]
     equations = problem(inputs.code, inputs.p, point.q, point.t)
     worst = ", ".join(missed(equations, point, row) for row in rows)
     places = listed(_places(inputs.code, point.q), most=NAMED_BODIES)

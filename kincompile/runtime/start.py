@@ -13,24 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import (
-    AS_NEAR,
-    ASTRAY,
-    FOLDED,
-    MAX_CORRECTIONS,
-    MIRROR_STEP,
-    MIRRORED,
-    MOST_MIRRORED,
-    MOST_TURNED,
-    NUDGE,
-    RESIDUAL_FACTOR,
-    RESTARTS,
-    SAME_POSITION,
-    SETTLED,
-    SUFFICIENT,
-    THROWN,
-    TOO_NEAR,
-)
+from kincompile import criteria
 from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense, Planned, stacked
 from kincompile.runtime.engine.scales import converges_linearly
 from kincompile.runtime.march import March, Outcome
@@ -64,7 +47,7 @@ def start(march: March, t: float, inputs: Inputs, *, is_in_vain: bool = False) -
     state = march.state(point)
     # Towards a singular position Newton's method creeps, and ends a rounding error before it.
     if not isinstance(state, Status) and converges_linearly(attempt.corrections):
-        state = Status.SINGULAR if state.sensitivity > TOO_NEAR else state
+        state = Status.SINGULAR if state.sensitivity > criteria.TOO_NEAR else state
     found = Outcome(
         Status.CONVERGED, iterations, None, point,
         left_branch=left, is_folded=folded, other=attempt.other,
@@ -144,9 +127,9 @@ def assemble(
             return min(attempts, key=lambda attempt: attempt.missed)
     opposite = other_side(equations, good[0].last)
     away = equations.away(good[0].last.q, guess)
-    if equations.away(opposite, guess) <= MIRRORED * max(1.0, away):
+    if equations.away(opposite, guess) <= criteria.MIRRORED * max(1.0, away):
         beyond = iterate(equations, t, opposite, *limits)
-        most = min(AS_NEAR * max(1.0, away), MIRRORED)
+        most = min(criteria.AS_NEAR * max(1.0, away), criteria.MIRRORED)
         is_sound = bool(beyond.points) and not is_thrown(equations, beyond.points)
         if is_sound and equations.away(beyond.last.q, guess) <= most:
             good = _ordered(equations, plain.points[0], [*good, beyond], tolerance)
@@ -180,9 +163,9 @@ def _ordered(
 def _as_near(equations: Problem, guess: Array, good: Sequence[Attempt]) -> Point | None:
     """Return another assembly than the first one that is as near to the guess, if one was met."""
     first, *rest = (attempt.last for attempt in good)
-    reach = AS_NEAR * equations.away(first.q, guess)
+    reach = criteria.AS_NEAR * equations.away(first.q, guess)
     for other in rest:
-        is_same = equations.distance(other.q, first.q) <= SAME_POSITION
+        is_same = equations.distance(other.q, first.q) <= criteria.SAME_POSITION
         if not is_same and equations.away(other.q, guess) <= reach:
             return other
     return None
@@ -193,13 +176,13 @@ def unwound(equations: Problem, t: float, point: Point, guess: Array, tolerance:
     far = np.abs(point.q - guess) > math.pi
     columns = np.flatnonzero((equations.angular | equations.code.may_turn) & far)
     # Together first: angles that a gear or a driver connects turn together.
-    for some in (columns, *columns) if columns.size <= MOST_TURNED else (columns,):
+    for some in (columns, *columns) if columns.size <= criteria.MOST_TURNED else (columns,):
         q = point.q.copy()
         q[some] -= math.tau * np.round((q - guess)[some] / math.tau)
         if not np.array_equal(q, point.q):
-            turned = iterate(equations, t, q, tolerance, MAX_CORRECTIONS)
+            turned = iterate(equations, t, q, tolerance, criteria.MAX_CORRECTIONS)
             is_same = turned.status is Status.CONVERGED
-            if is_same and equations.extent(turned.last.q - q) <= SAME_POSITION:
+            if is_same and equations.extent(turned.last.q - q) <= criteria.SAME_POSITION:
                 point = turned.last
     return _covered(equations, t, point, guess, tolerance)
 
@@ -212,11 +195,11 @@ def _covered(equations: Problem, t: float, point: Point, guess: Array, tolerance
     for cover in equations.code.covers:
         p = point.q[cover]
         along = p @ guess[cover]
-        if (along if abs(along) > SAME_POSITION else p[np.argmax(np.abs(p))]) < 0:
+        if (along if abs(along) > criteria.SAME_POSITION else p[np.argmax(np.abs(p))]) < 0:
             q = point.q.copy()
             q[cover] = -q[cover]
             other = equations.at(q, t)
-            if other is not None and equations.holds(other, RESIDUAL_FACTOR * tolerance):
+            if other is not None and equations.holds(other, criteria.RESIDUAL_FACTOR * tolerance):
                 point = other
     return point
 
@@ -226,8 +209,10 @@ def restart_points(equations: Problem, guess: Array) -> list[Array]:
 
     With all bodies on a line, as with zeros, Phi_q gives no direction in which to bend.
     """
-    bends = (np.roll(equations.probe, k)[: guess.shape[-1]] for k in range(RESTARTS))
-    nudges = (k * NUDGE * equations.reference * bend for k, bend in enumerate(bends, start=1))
+    bends = (np.roll(equations.probe, k)[: guess.shape[-1]] for k in range(criteria.RESTARTS))
+    nudges = (
+        k * criteria.NUDGE * equations.reference * bend for k, bend in enumerate(bends, start=1)
+    )
     return [guess, *(guess + nudge for nudge in nudges)]
 
 
@@ -239,7 +224,9 @@ def _is_careful(equations: Problem) -> bool:
 
 def left_branch(equations: Problem, guess: Point, found: Point) -> bool:
     """Say whether a position found from a guess is not what the guess shows."""
-    is_far = equations.is_far(found.q, guess.q) or equations.away(found.q, guess.q) > ASTRAY
+    is_far = (
+        equations.is_far(found.q, guess.q) or equations.away(found.q, guess.q) > criteria.ASTRAY
+    )
     return bool(is_far) or leaves_branch(equations, guess, found)
 
 
@@ -253,7 +240,7 @@ def leaves_branch(equations: Problem, guess: Point, found: Point) -> bool:
 def is_folded(equations: Problem, guess: Point, found: Point) -> bool:
     """Say whether a guess shows no branch: beside a position, a determinant is zero there."""
     here, there = (equations.engine.determinants(point, point) for point in (guess, found))
-    return bool((np.abs(here) <= FOLDED * np.abs(there)).any())
+    return bool((np.abs(here) <= criteria.FOLDED * np.abs(there)).any())
 
 
 def is_settled(equations: Problem, way: Sequence[Point]) -> bool:
@@ -262,13 +249,15 @@ def is_settled(equations: Problem, way: Sequence[Point]) -> bool:
     In compiled code it must not have gone far: where it ends then, rounding would decide.
     """
     away = np.abs(way[-1].q - way[0].q) / equations.near
-    return bool(away.max() <= SETTLED) and (_is_careful(equations) or not is_thrown(equations, way))
+    return bool(away.max() <= criteria.SETTLED) and (
+        _is_careful(equations) or not is_thrown(equations, way)
+    )
 
 
 def is_thrown(equations: Problem, way: Sequence[Point]) -> bool:
     """Say whether a way went so far that rounding errors decide where it ends."""
     iterates = np.array([point.q for point in way])
-    return not bool((np.abs(iterates - iterates[0]) / equations.near <= THROWN).all())
+    return not bool((np.abs(iterates - iterates[0]) / equations.near <= criteria.THROWN).all())
 
 
 def turned_guess(equations: Problem, way: Sequence[Point]) -> Array | None:
@@ -281,12 +270,12 @@ def turned_guess(equations: Problem, way: Sequence[Point]) -> Array | None:
     turns = np.round((way[min(1, len(way) - 1)].q - guess.q) / math.tau)
     turning = np.flatnonzero(equations.angular & (turns != 0)).tolist()
     columns = [column for column in turning if _is_bound(equations, guess, column)]
-    for some in (columns, *([column] for column in columns[:MOST_TURNED])):
+    for some in (columns, *([column] for column in columns[: criteria.MOST_TURNED])):
         q = guess.q.copy()
         q[some] += math.tau * turns[some]
         other = equations.at(q, guess.t)
         if other is not None and equations.missed(other.Phi) < (
-            (1 - SUFFICIENT) * equations.missed(guess.Phi)
+            (1 - criteria.SUFFICIENT) * equations.missed(guess.Phi)
         ):
             guess = other
             turns[some] = 0.0
@@ -305,11 +294,11 @@ def turned_guesses(equations: Problem, engine: Planned, guesses: Array, t: float
     turns = np.round(np.where(np.isfinite(change), -change, 0.0) / math.tau)
     turns[~equations.angular] = 0.0
     columns, least = np.flatnonzero(turns.any(axis=1)), missed(q)
-    for some in (columns, *columns[:MOST_TURNED, np.newaxis]):
+    for some in (columns, *columns[: criteria.MOST_TURNED, np.newaxis]):
         other = q.copy()
         other[some] += math.tau * turns[some]
         now = missed(other)
-        fewer = now < (1 - SUFFICIENT) * least
+        fewer = now < (1 - criteria.SUFFICIENT) * least
         q[:, fewer], least[fewer] = other[:, fewer], now[fewer]
         turns[np.ix_(some, fewer)] = 0.0
     return q
@@ -320,7 +309,7 @@ def _is_bound(equations: Problem, point: Point, column: int) -> bool:
     q = point.q.copy()
     q[column] += math.tau
     other = equations.at(q, point.t)
-    return other is None or equations.missed(other.Phi - point.Phi) > SAME_POSITION
+    return other is None or equations.missed(other.Phi - point.Phi) > criteria.SAME_POSITION
 
 
 def other_side(equations: Problem, point: Point) -> Array:
@@ -331,7 +320,7 @@ def other_side(equations: Problem, point: Point) -> Array:
     :math:`\sigma = u^T \Phi_q v` of one falls along :math:`v`, to zero half way to the other.
     NaN where the mechanism is too large, or nothing bends.
     """
-    if point.q.size > MOST_MIRRORED:
+    if point.q.size > criteria.MOST_MIRRORED:
         return np.full_like(point.q, np.nan)
     return mirrored(
         equations, point.q, point.Phi_q, lambda q: equations.engine.evaluate(q, point.t).Phi_q
@@ -348,6 +337,6 @@ def mirrored(
     here = np.where(known, here, 0.0)  # LAPACK would say so on the terminal
     left, sizes, right = np.linalg.svd(here, full_matrices=False)
     u, size, v = left[..., np.newaxis, :, -1], sizes[..., -1:], right[..., -1, :]
-    moved = rows * evaluate(q + MIRROR_STEP * scale * v) * scale
-    bend = (u @ (moved - here) @ v[..., np.newaxis])[..., 0] / MIRROR_STEP
+    moved = rows * evaluate(q + criteria.MIRROR_STEP * scale * v) * scale
+    bend = (u @ (moved - here) @ v[..., np.newaxis])[..., 0] / criteria.MIRROR_STEP
     return np.where(known[..., 0], q - 2 * size / bend * scale * v, np.nan)

@@ -8,23 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.errors import InternalError
-from kincompile.view.marks import (
-    BodyFrame,
-    Contour,
-    Dot,
-    Drive,
-    Hull,
-    Mark,
-    Pin,
-    Polygon,
-    Rail,
-    Slider,
-    Span,
-    Symbol,
-    Wheel,
-    in_ground,
-    shape_of,
-)
+from kincompile.view import marks
+from kincompile.view.marks import BodyFrame, Mark, in_ground, shape_of
 from kincompile.view.shapes import LOOKS, SHAPES, Look, Stroke
 
 if TYPE_CHECKING:
@@ -108,9 +93,9 @@ def pieces(points: Array) -> list[Array]:
 def owner(mark: Mark, on: str) -> BodyFrame:
     """Return the frame whose colour a stroke of a mark has."""
     match mark:
-        case Pin() | Span():
+        case marks.Pin() | marks.Span():
             return mark.first.frame if on in ("first", "barrel") else mark.second.frame
-        case Slider() | Wheel() | Drive() | Dot() | Symbol():
+        case marks.Slider() | marks.Wheel() | marks.Drive() | marks.Dot() | marks.Symbol():
             return mark.place.frame
     return mark.frame
 
@@ -122,27 +107,27 @@ def _left_of(direction: Array) -> Array:
 def _axes(mark: Mark, on: str, q: Array) -> tuple[Array, Array, float]:
     """Return origin, direction of length one, and length, of the line that a stroke is drawn on."""
     match mark:
-        case Rail():
+        case marks.Rail():
             return _between(*(in_ground(q, mark.frame, end) for end in (mark.start, mark.end)))
-        case Span() if on == "barrel":
+        case marks.Span() if on == "barrel":
             start, along, length = _between(mark.first.at(q), mark.second.at(q))
             return start, along, min(mark.barrel, length)
-        case Span():
+        case marks.Span():
             return _between(mark.first.at(q), mark.second.at(q))
-        case Pin() if on == "line":
+        case marks.Pin() if on == "line":
             return _between(mark.first.at(q), mark.second.at(q))
-        case Wheel():
+        case marks.Wheel():
             theta = np.array((np.cos(mark.theta), np.sin(mark.theta)))
             centre, frame = np.array(mark.place.point), mark.place.frame
             return _between(*in_ground(q, frame, np.array((centre, centre + mark.radius * theta))))
-        case Slider():
+        case marks.Slider():
             tip = in_ground(q, mark.guide, np.array(((0.0, 0.0), mark.axis)))
             return mark.place.at(q), tip[1] - tip[0], 0.0
-        case Drive() if mark.axis is not None:
+        case marks.Drive() if mark.axis is not None:
             return mark.place.at(q), np.array(mark.axis), 0.0
-        case Pin():
+        case marks.Pin():
             place = mark.first if on == "first" else mark.second
-        case Drive() | Dot():
+        case marks.Drive() | marks.Dot():
             place = mark.place
         case _:
             raise InternalError(f"{type(mark).__name__} has no axes of its own")
@@ -158,14 +143,14 @@ def _between(start: Array, end: Array) -> tuple[Array, Array, float]:
 def _curve(mark: Mark, q: Array, grow: float) -> Array:
     """Return a closed curve, widened: of a wheel, its circle, of a link, its hull."""
     match mark:
-        case Wheel():
+        case marks.Wheel():
             points = np.array(mark.place.point) + (mark.radius + grow) * CIRCLE
             return in_ground(q, mark.place.frame, points)
-        case Hull():
+        case marks.Hull():
             points = _rounded(np.array(mark.points), grow)
-        case Polygon():
+        case marks.Polygon():
             points = np.array(mark.points)
-        case Contour():
+        case marks.Contour():
             points = np.array(mark.points)
             # Along the bisectors of its corners, which of a smooth curve are its normals.
             along = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)

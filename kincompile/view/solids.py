@@ -10,17 +10,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from kincompile.errors import InternalError
+from kincompile.view import marks
 from kincompile.view.body_shapes import convex_chain
-from kincompile.view.marks import (
-    Dot,
-    Drive,
-    Hull,
-    Span,
-    Symbol,
-    ends_of,
-    in_ground,
-    shape_of,
-)
+from kincompile.view.marks import ends_of, in_ground, shape_of
 from kincompile.view.polylines import owner
 from kincompile.view.solid_shapes import SOLID_LOOKS, SOLIDS
 
@@ -111,7 +103,7 @@ class Solid:
     def parts(self, places: Places) -> list[Part]:
         """Return its parts where they are."""
         piece, mark = self.piece, self.mark
-        if isinstance(mark, Hull) and piece.on == "points":
+        if isinstance(mark, marks.Hull) and piece.on == "points":
             faces, _ = wires(mark.points)
             return [
                 Part(
@@ -121,7 +113,7 @@ class Solid:
                 )
                 for points, normal in faces
             ]
-        if piece.is_ball and isinstance(mark, Symbol | Dot):
+        if piece.is_ball and isinstance(mark, marks.Symbol | marks.Dot):
             centre = places.at(mark.place.frame, mark.place.point)
             return [Part(centre[None], radius=piece.grow * self.size)]
         return [part for line in _lines(mark, piece.on, places) for part in self._on(line)]
@@ -161,20 +153,20 @@ class _Line:
 
 def _lines(mark: Mark, on: str, places: Places) -> list[_Line]:
     match mark:
-        case Hull():
+        case marks.Hull():
             _, edges = wires(mark.points)
             return [
                 _between(places.at(mark.frame, first), places.at(mark.frame, last))
                 for first, last in edges
             ]
-        case Span():
+        case marks.Span():
             start, end = (places.at(to.frame, to.point) for to in (mark.first, mark.second))
             line = _between(start, end, mark.barrel if on == "barrel" else np.inf)
             return [_from(line, mark.barrel) if on == "stem" else line]
-        case Drive():
+        case marks.Drive():
             axis = np.array(mark.axis, dtype=np.float64)
             return [_Line(places.at(mark.place.frame, mark.place.point), axis, beside(axis))]
-        case Symbol():
+        case marks.Symbol():
             frame = mark.place.frame
             axis, aside = (places.along(frame, vector) for vector in (mark.axis, mark.cross))
             if on != "reach":

@@ -51,7 +51,7 @@ def test_a_gap_of_many_turns_is_followed_and_counted(form, quick_compiler):
 
 
 def test_a_gap_of_too_many_turns_ends_with_what_to_do_and_shows_progress(monkeypatch):
-    monkeypatch.setattr("kincompile.runtime.march.MAX_SUBSTEPS", 600)
+    monkeypatch.setattr("kincompile.criteria.MAX_SUBSTEPS", 600)
     assert criteria.MAX_SUBSTEPS == 10_000
     seen = []
     module = kc.compile(linkages.four_bar().mechanism)

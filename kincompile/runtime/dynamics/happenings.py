@@ -12,17 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import (
-    FORESEEN,
-    IMAGINARY,
-    IN_RANGE,
-    LOST,
-    NEARLY,
-    ROOT_LENGTH,
-    SHORT,
-    SINGULAR_SENSITIVITY,
-    SLIGHT,
-)
+from kincompile import criteria
 from kincompile.errors import InputError
 from kincompile.runtime.inputs import mapping_of
 from kincompile.runtime.singular import events as singular
@@ -128,7 +118,7 @@ class Watch:
         point = self._equations.point(q, t)
         if point is None or not self._equations.holds(point):
             return None
-        movements, _ = self._lost(point, 1 / SINGULAR_SENSITIVITY)
+        movements, _ = self._lost(point, 1 / criteria.SINGULAR_SENSITIVITY)
         if not movements.size:
             return None
         return event_of(self._inputs.code, SINGULAR, SENTENCES, t, q.copy(), movements)
@@ -141,12 +131,12 @@ class Watch:
         point = self._equations.point(q, t)
         if point is None:
             return None
-        movements, demands = self._lost(point, LOST)
+        movements, demands = self._lost(point, criteria.LOST)
         if not movements.size:
             return None
         demanded = self._equations.demanded(q, t)
         size = float(np.linalg.norm(demands.T @ demanded))
-        is_driven = size > IN_RANGE * float(np.linalg.norm(demanded))
+        is_driven = size > criteria.IN_RANGE * float(np.linalg.norm(demanded))
         kind = LOCK_UP if is_driven else SINGULAR
         return event_of(self._inputs.code, kind, SENTENCES, t, q.copy(), movements)
 
@@ -158,7 +148,7 @@ class Watch:
         return np.asarray(np.concatenate((q, values))[self._columns] - self._values)
 
     def _located(self, k: int, t0: float, t1: float, state: States) -> Event:
-        width = ROOT_LENGTH * max(abs(t1 - t0), abs(t0), abs(t1))
+        width = criteria.ROOT_LENGTH * max(abs(t1 - t0), abs(t0), abs(t1))
         t = root(lambda time: float(self._away(time, state(time))[k]), t0, t1, width)
         q = state(t)[: self._equations.n]
         code = self._inputs.code
@@ -187,7 +177,7 @@ def times_to(equations: Equations, t: float, y: Array) -> Array:
     n, none = equations.n, np.zeros(0)
     q, q_dot = y[:n], y[n : 2 * n]
     speed = float((np.abs(q_dot) / equations.scale).max(initial=0.0))
-    step = SLIGHT / speed if speed > 0 else 0.0
+    step = criteria.SLIGHT / speed if speed > 0 else 0.0
     here, there = equations.point(q, t), equations.point(q + step * q_dot, t + step)
     if not step or here is None or there is None or not here.Phi.size:
         return none
@@ -199,7 +189,7 @@ def times_to(equations: Equations, t: float, y: Array) -> Array:
     except np.linalg.LinAlgError:  # it is singular here
         return np.zeros(1)
     times = -1 / found[found != 0]
-    return np.asarray(times.real[np.abs(times.imag) <= IMAGINARY * np.abs(times.real)])
+    return np.asarray(times.real[np.abs(times.imag) <= criteria.IMAGINARY * np.abs(times.real)])
 
 
 def ahead(times: Array, forward: float) -> float:
@@ -230,7 +220,7 @@ def foreseen(equations: Equations, t: float, y: Array, span: float) -> float:
 
     Times are signed, as the motion goes.
     """
-    n, part = equations.n, FORESEEN * span
+    n, part = equations.n, criteria.FORESEEN * span
     rate = equations.rate(t, y)
     there = y + part * rate
     there[:n] += part**2 / 2 * rate[n : 2 * n]
@@ -251,10 +241,10 @@ def passage(equations: Equations, t0: float, t1: float, state: States) -> Passag
         away = float(times[np.argmin(np.abs(times))])
         if not abs(t + away - (t0 + t1) / 2) < abs(t1 - t0) / 2:
             return None
-        if abs(away) <= NEARLY * abs(t1 - t0):
+        if abs(away) <= criteria.NEARLY * abs(t1 - t0):
             t += away
             break
-        t += SHORT * away
+        t += criteria.SHORT * away
     else:
         return None
     sides = []

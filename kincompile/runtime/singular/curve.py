@@ -16,22 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import (
-    ARC_CORRECTIONS,
-    AROUND,
-    AROUND_OFFSETS,
-    BESIDE,
-    FIRST_ARC,
-    LONGEST_ARC,
-    MAX_ARCS,
-    ROOT_LENGTH,
-    ROOT_STEPS,
-    SHORTEST_ARC,
-    SLIGHT,
-    SMALL_CORRECTION,
-    STRAIGHT,
-    TOLERABLE_CORRECTION,
-)
+from kincompile import criteria
 from kincompile.runtime.engine.linear import solve_linear
 from kincompile.runtime.engine.scales import weights_of
 
@@ -87,7 +72,9 @@ class Curve:
         y = np.append(place.q, place.t) + length * place.tangent * self.scale
         predicted = y.copy()
         last = math.inf
-        for _ in range(ARC_CORRECTIONS):  # in time too, whose rounding no equation's terms show
+        for _ in range(
+            criteria.ARC_CORRECTIONS
+        ):  # in time too, whose rounding no equation's terms show
             found = self._derivatives(y[:-1], float(y[-1]))
             if found is None:
                 return None
@@ -101,25 +88,27 @@ class Curve:
                 return None
             y = y - change * self.scale
             size = float(np.max(np.abs(change)))
-            if size <= SMALL_CORRECTION or (size <= TOLERABLE_CORRECTION and size > last / 4):
+            if size <= criteria.SMALL_CORRECTION or (
+                size <= criteria.TOLERABLE_CORRECTION and size > last / 4
+            ):
                 break
             last = size
         else:
             return None
         moved = float(np.linalg.norm((y - predicted) / self.scale))
-        if not moved <= max(abs(length) / 4, TOLERABLE_CORRECTION):
+        if not moved <= max(abs(length) / 4, criteria.TOLERABLE_CORRECTION):
             return None
         return self._place(y[:-1], float(y[-1]), place.tangent)
 
     def next_singular(self, place: CurvePoint, latest: float) -> Bracket | None:
         """Follow the curve up to a time, or to the first step that contains a singular point."""
-        length = FIRST_ARC
+        length = criteria.FIRST_ARC
         forward = math.copysign(1.0, latest - place.t)
-        for _ in range(MAX_ARCS):
+        for _ in range(criteria.MAX_ARCS):
             following = self.step(place, length)
-            if following is None or following.tangent @ place.tangent < STRAIGHT:
+            if following is None or following.tangent @ place.tangent < criteria.STRAIGHT:
                 length /= 2
-                if length < SHORTEST_ARC:
+                if length < criteria.SHORTEST_ARC:
                     return None
                 continue
             turns = following.tangent[-1] * place.tangent[-1] <= 0
@@ -127,7 +116,7 @@ class Curve:
                 return Bracket(place, following, length, turns)
             if (following.t - latest) * forward > 0:
                 return None
-            place, length = following, min(2 * length, LONGEST_ARC)
+            place, length = following, min(2 * length, criteria.LONGEST_ARC)
         return None
 
     def singular_point(self, bracket: Bracket) -> tuple[CurvePoint, float] | None:
@@ -136,34 +125,38 @@ class Curve:
         if bracket.turns:
             at = self._zero(bracket, lambda place: float(place.tangent[-1]))
             # Where several movements become free at once no step ends; beside it t is the same.
-            for offset in BESIDE:
+            for offset in criteria.BESIDE:
                 place = self.step(first, at + offset)
                 if place is not None:
                     return place, at + offset
             return None
         blocks = self._changed(first, bracket.second)
         at = self._zero(bracket, lambda place: float(self._parts(first, place, blocks).min()))
-        before = self.step(first, at - AROUND)
+        before = self.step(first, at - criteria.AROUND)
         parts = np.zeros(len(blocks)) if before is None else self._parts(first, before, blocks)
         return self._between(first, at, blocks[int(np.argmin(parts))])
 
     def _between(self, first: CurvePoint, at: float, block: int) -> tuple[CurvePoint, float] | None:
         """Return a bifurcation by interpolation of places so far from it that they are accurate."""
-        places = [self.step(first, at + offset * AROUND) for offset in AROUND_OFFSETS]
+        places = [
+            self.step(first, at + offset * criteria.AROUND) for offset in criteria.AROUND_OFFSETS
+        ]
         known = [place for place in places if place is not None]
-        if len(known) < len(AROUND_OFFSETS):
+        if len(known) < len(criteria.AROUND_OFFSETS):
             return None
-        powers = np.vander(AROUND_OFFSETS)
+        powers = np.vander(criteria.AROUND_OFFSETS)
         values = np.array([
             [*place.q, place.t, self._value(place, first, block)] for place in known
         ])  # fmt: skip
         coefficients = np.linalg.solve(powers, values)
         roots = np.roots(coefficients[:, -1])
-        real = roots.real[np.abs(roots.imag) <= np.abs(roots.real) * SLIGHT + SLIGHT]
+        real = roots.real[
+            np.abs(roots.imag) <= np.abs(roots.real) * criteria.SLIGHT + criteria.SLIGHT
+        ]
         x = float(real[np.argmin(np.abs(real))]) if real.size else 0.0
-        y = np.vander([x], len(AROUND_OFFSETS))[0] @ coefficients[:, :-1]
+        y = np.vander([x], len(criteria.AROUND_OFFSETS))[0] @ coefficients[:, :-1]
         place = self._place(y[:-1], float(y[-1]), first.tangent)
-        return None if place is None else (place, at + x * AROUND)
+        return None if place is None else (place, at + x * criteria.AROUND)
 
     def _value(self, place: CurvePoint, first: CurvePoint, block: int) -> float:
         """Return the determinant of a block at a place."""
@@ -176,7 +169,7 @@ class Curve:
             place = self.step(bracket.first, length) if length else bracket.first
             return math.nan if place is None else value(place)
 
-        return root(at, 0.0, bracket.length, ROOT_LENGTH)
+        return root(at, 0.0, bracket.length, criteria.ROOT_LENGTH)
 
     def _parts(self, before: CurvePoint, after: CurvePoint, blocks: list[int] | slice) -> Vector:
         """Return the determinants of blocks, as parts of what they were."""
@@ -231,7 +224,7 @@ def zero(low: float, high: float, width: float) -> Generator[float, tuple[float,
         return
     (before, value_before), (earlier, last) = (low, at_low), (math.inf, math.inf)
     t = (low + high) / 2
-    for _ in range(ROOT_STEPS):
+    for _ in range(criteria.ROOT_STEPS):
         value, slope = yield t
         if value == 0 or not math.isfinite(value):
             return
