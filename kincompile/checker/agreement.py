@@ -175,10 +175,15 @@ def is_alike(one: Array, other: Array, sizes: Array | float = 0.0) -> Array:
 
 def is_close(one: Array, other: Array, lost: Array | float = 0.0) -> bool:
     """Return whether the numbers of an entry, (N,), are those of a fault."""
-    size = np.maximum(np.max(np.abs(one)), np.max(np.abs(other)))
-    if not np.isfinite(size):
-        return False
-    return bool(np.all(np.abs(one - other) <= CLOSE * size + ABSOLUTE + lost))
+    return bool(are_close(one, other, lost))
+
+
+def are_close(one: Array, other: Array, lost: Array | float = 0.0) -> Array:
+    """Return which numbers of entries, (N, ...), are those of a fault."""
+    size = np.maximum(np.max(np.abs(one), axis=0), np.max(np.abs(other), axis=0))
+    with np.errstate(invalid="ignore"):
+        close = np.all(np.abs(one - other) <= CLOSE * size + ABSOLUTE + lost, axis=0)
+    return np.asarray(close & np.isfinite(size))
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ from kincompile.checker.comparer import NUMBERS, Comparer
 from kincompile.checker.comparison import Verdict
 from kincompile.checker.conventions import stated_conventions
 from kincompile.checker.given_forms import Forms
-from kincompile.checker.hand_file import read_hand_file
+from kincompile.checker.hand_file import HandFile, read_hand_file
 from kincompile.checker.load_comparer import LoadComparer
 from kincompile.checker.reference import (
     COMPARED,
@@ -167,7 +167,7 @@ def _states(
 
 def compare_file(
     model: Mechanism | ConstraintSystem | Reference | Transmission,
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | HandFile,
     *,
     constraint: str | None = None,
     strict: bool = False,
@@ -179,7 +179,7 @@ def compare_file(
     model
         As for `compare`.
     path
-        The hand file: TOML, JSON or lines ``Name = [[...]]``; see `read_hand_file`.
+        The hand file: TOML, JSON or lines ``Name = [[...]]``; or what `read_hand_file` made of it.
     constraint
         Name of the one constraint that is checked alone; the file's own where None.
     strict
@@ -195,7 +195,7 @@ def compare_file(
     ModelError, InputError
         As `compare` does; a message begins with the file and the line.
     """
-    file = read_hand_file(Path(path))
+    file = path if isinstance(path, HandFile) else read_hand_file(Path(path))
     reference = _reference(model)
     constraint = file.constraint if constraint is None else constraint
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import accumulate
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping, Sequence
 
     from kincompile.checker.comparison import Convention
+    from kincompile.ir.graph import Node
     from kincompile.model.bodies import Body
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.resolve import FreeEquation, Joint
@@ -405,16 +406,14 @@ class Reference:
         self, known: dict[sympy.Expr, Array], expressions: Sequence[sympy.Expr], states: States
     ) -> None:
         """Evaluate expressions that are not known yet: value and size of each, (2, N)."""
-        graph = Graph()
-        convert = Converter(graph, graph.input).convert
-        terms = [[convert(term) for term in sympy.Add.make_args(item)] for item in expressions]
+        nodes, terms = _converted(tuple(expressions))
         with np.errstate(all="ignore"):
             inputs, tables = self.inputs(states), self.program.tables
-            results = run(graph.nodes, inputs, tables)
-            lost = cancelled(graph.nodes, results, inputs, tables)
-            for item, nodes in zip(expressions, terms, strict=True):
+            results = run(nodes, inputs, tables)
+            lost = cancelled(nodes, results, inputs, tables)
+            for item, own in zip(expressions, terms, strict=True):
                 known[item] = np.zeros((2, len(states)))
-                for node in nodes:
+                for node in own:
                     known[item][0] += results[node]
                     known[item][1] += np.abs(results[node]) + lost[node]
 
@@ -445,6 +444,15 @@ class Reference:
         nodes = {name: convert(spin) for name, spin in self.spins.items() if name not in inputs}
         results = run(graph.nodes, inputs, self.program.tables)
         return inputs | {name: results[node] for name, node in nodes.items()}
+
+
+@lru_cache(maxsize=8)  # formulas are read in hundreds of ways, each at states of its own
+def _converted(expressions: tuple[sympy.Expr, ...]) -> tuple[list[Node], list[list[int]]]:
+    """Return expressions as a graph, and the nodes of the terms of each."""
+    graph = Graph()
+    convert = Converter(graph, graph.input).convert
+    terms = [[convert(term) for term in sympy.Add.make_args(item)] for item in expressions]
+    return graph.nodes, terms
 
 
 @dataclass(frozen=True, slots=True)

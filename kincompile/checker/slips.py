@@ -37,6 +37,8 @@ MOST_WORDS = 240
 MOST_PRODUCTS = 200
 MOST_PAIRED = 30_000
 """Slips of which two are taken together."""
+MOST_SUMS = 100_000
+"""Pairs of slips that are tried, of those whose sum is near enough in one weighted sum."""
 POWERS = tuple(map(sympy.Rational, ("1", "-1", "2", "-2", "1/2", "-1/2")))
 MULTIPLES = tuple(map(Fraction, ("-1", "0", "2", "1/2")))
 
@@ -331,7 +333,12 @@ def _summing(changes: Array, off: Array, allowed: Array) -> Iterator[tuple[int, 
     order = np.argsort(sums)
     first = np.searchsorted(sums[order], target - sums - reach)
     last = np.searchsorted(sums[order], target - sums + reach)
+    tried = 0
     for a in np.flatnonzero(last > first):
-        for b in order[first[a] : last[a]]:
-            if a < b and _fitting(changes[:, [a]] + changes[:, [b]], off, allowed):
-                yield int(a), int(b)
+        others = order[first[a] : last[a]]
+        others = others[others > a]
+        tried += 1 + len(others)
+        if tried > MOST_SUMS:  # numbers of few digits: many pairs are near enough
+            return
+        for k in _fitting(changes[:, [a]] + changes[:, others], off, allowed):
+            yield int(a), int(others[k])

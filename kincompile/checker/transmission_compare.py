@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kincompile.checker.comparer import NUMBERS
 from kincompile.checker.transmission_comparer import TransmissionComparer
@@ -19,7 +19,7 @@ from kincompile.model.inputs import input_name
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -66,9 +66,7 @@ def read_maps(
     return readings
 
 
-def _functions(
-    reference: TransmissionReference, quantity: str, value: Callable[..., object]
-) -> list[Written]:
+def _functions(reference: TransmissionReference, quantity: str, value: Any) -> list[Written]:
     """Return a function in the ways in which its arguments may be meant.
 
     A method of a transmission takes all states at once, and parameters by name. That of the inverse

@@ -38,6 +38,7 @@ from kincompile.checker.transmission_faults import (
     missing_terms,
 )
 from kincompile.checker.transmission_maps import KINDS, Map, maps_at, turned
+from kincompile.files.safe_expressions import extent
 from kincompile.model.expressions import symbol_names
 from kincompile.names import listed, rate
 
@@ -52,6 +53,8 @@ if TYPE_CHECKING:
 
 MOST_PERMUTED = 16
 """Rows and columns whose order is looked for; that takes as many trials as rows squared."""
+MOST_TAKEN_APART = 4000
+"""Parts of the formulas that are corrected one by one; of longer ones the first entries are."""
 NOT_ENERGY = "energy is not conserved: effort is not J^T of the velocities"
 
 
@@ -256,13 +259,19 @@ class TransmissionComparer:
         written = {(i, j): (laid.given.values[:, i, j], lost[:, i, j]) for i, j in wrong}
         left, found = defined(written)
 
+        parts = 0
+
         def entry_of(place: Index) -> HandEntry:
+            nonlocal parts
             expression, (i, j) = laid.written.formula(*place), place
-            typed = expression is not None and TypedEntry(
-                self._reference, laid.quantity, expression, self._states, is_by_hand=True
-            )
+            parts += extent(expression)[0] if expression is not None else 0
+            typed = None
+            if expression is not None and parts <= MOST_TAKEN_APART:
+                typed = TypedEntry(
+                    self._reference, laid.quantity, expression, self._states, is_by_hand=True
+                )
             right = laid.right.values[:, i, j], lost[:, i, j]
-            return HandEntry(typed or None, right, written[place][0])
+            return HandEntry(typed, right, written[place][0])
 
         entries = {place: entry_of(place) for place in left}
         faults = [*self._of_matrix(laid)]

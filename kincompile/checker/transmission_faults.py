@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations, product
+from itertools import combinations, islice, product
 from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy
 
-from kincompile.checker.agreement import ABSOLUTE, CLOSE, is_close
+from kincompile.checker.agreement import ABSOLUTE, CLOSE, are_close, is_close
 from kincompile.checker.fault import NEAR, Fault, Kind, multiple_fault
 from kincompile.checker.turned import turned_vector
 from kincompile.errors import InputError
@@ -33,6 +33,12 @@ if TYPE_CHECKING:
 POWERS = (1.0, -1.0, 2.0, -2.0, 0.5, -0.5)
 MOST_MISREAD = 14
 """Names of which each is read as each other."""
+MOST_READINGS = 250
+"""Ways to read names that are tried; a function is called at each state for each of them."""
+MOST_PARTS = 150_000
+"""Of formulas, that are evaluated for all these ways together."""
+MOST_MATRICES = 4000
+"""Matrices with a fault that are compared with the one by hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +63,7 @@ class Matrix:
 
     def fault(self, kind: str, text: str, values: Array) -> Iterator[NumericFault]:
         """Yield a fault with all entries in which it shows."""
-        places = [
-            (i, j)
-            for i, j in np.ndindex(*self.right.shape[1:])
-            if not is_close(values[:, i, j], self.right[:, i, j])
-        ]
+        places = np.argwhere(~are_close(values, self.right)).tolist()
         if places:
             yield Fault(kind, text, {(i, j): values[:, i, j] for i, j in places})
 
@@ -79,7 +81,10 @@ class MatrixFaults:
         self._reference, self._states = reference, states
 
     def of(self, matrix: Matrix) -> Iterator[NumericFault]:
-        """Yield the faults of a matrix."""
+        """Yield the faults of a matrix, as many as are tried."""
+        yield from islice(self._all(matrix), MOST_MATRICES)
+
+    def _all(self, matrix: Matrix) -> Iterator[NumericFault]:
         yield from self._multiples(matrix)
         yield from self._exchanged(matrix, "columns")
         yield from self._frames(matrix)
@@ -238,20 +243,16 @@ def misread(
         The right values as they are laid out in what is written, (N, rows, columns).
     """
     given, inputs = written.evaluate(states).values, reference.inputs(states)
-    for kind, text, changes in _readings(reference, written, inputs):
+    most = min(MOST_READINGS, MOST_PARTS // (1 + written.size))
+    for kind, text, changes in islice(_readings(reference, written, inputs), most):
         try:
             read = written.evaluate(reference.read_as(states, changes)).values
         except InputError:  # a function may not be defined there
             continue
-        changed = [
-            (i, j)
-            for i, j in np.ndindex(*given.shape[1:])
-            if not is_close(read[:, i, j], given[:, i, j])
-        ]
-        fits = {(i, j): is_close(read[:, i, j], right[:, i, j]) for i, j in changed}
-        every = set(range(given.shape[1]))
-        for rows in (every, *({i} for i in every if len(every) > 1)):
-            own = [place for place in changed if place[0] in rows]
+        changed, fits = ~are_close(read, given), are_close(read, right)
+        every = range(given.shape[1])
+        for rows in (every, *([i] for i in every if len(every) > 1)):
+            own = [(i, j) for i, j in np.argwhere(changed).tolist() if i in rows]
             if own and all(fits[place] for place in own):
                 yield Fault(kind, text, {(i, j): given[:, i, j] for i, j in own})
 

@@ -75,6 +75,11 @@ class Written:
         symbol = sympy.Symbol(name)
         return self.expressions is None or any(item.has(symbol) for item in self.expressions)
 
+    @property
+    def size(self) -> int:
+        """Number of parts of all formulas; of functions and arrays 0."""
+        return sum(extent(item)[0] for item in self.expressions or ())
+
     def formula(self, row: int, column: int) -> sympy.Expr | None:
         """Return an entry as an expression, None of functions and arrays."""
         if self.expressions is None:

@@ -23,6 +23,7 @@ from kincompile.names import listed
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
+    from kincompile.checker.hand_file import HandFile
     from kincompile.cli.shared import Ends
 
 
@@ -62,10 +63,13 @@ def command(
     for path in filter(None, (output, gradescope)):
         require_output(path, model, "the model itself")
         require_output(path, hand, "the file to compare")
+    from kincompile.checker.hand_file import read_hand_file
+
     read: Any = read_model(model)
-    if ends := transmission or _ends(model, hand):
+    file = read_hand_file(hand)
+    if ends := transmission or _ends(model, hand, file):
         read = kc.transmission(read, *ends)
-    report = kc.compare_file(read, hand, constraint=constraint, strict=strict)
+    report = kc.compare_file(read, file, constraint=constraint, strict=strict)
     if output is not None:
         write_atomically(output, getattr(report, writers[Path(output).suffix])(reveal))
     if gradescope is not None:
@@ -80,12 +84,10 @@ def command(
         context.exit(DIFFERENT)
 
 
-def _ends(model: str, hand: str) -> Ends | None:
+def _ends(model: str, hand: str, file: HandFile) -> Ends | None:
     """Return inputs and outputs, from HAND or else MODEL, where HAND is of a transmission."""
-    from kincompile.checker.hand_file import read_hand_file
     from kincompile.checker.reference import OF_TRANSMISSIONS
 
-    file = read_hand_file(hand)
     own = [name for name in file.quantities if name in OF_TRANSMISSIONS]
     if file.transmission is not None or not own:
         return file.transmission

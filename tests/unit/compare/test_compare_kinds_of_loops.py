@@ -14,6 +14,7 @@ import sympy
 from click.testing import CliRunner
 
 import kincompile as kc
+from kincompile.checker import hand_file
 from kincompile.checker.report import Report
 from kincompile.checker.transmission_reference import TransmissionReference
 from kincompile.cli import cli
@@ -52,6 +53,10 @@ def reference(name: str) -> TransmissionReference:
     return TransmissionReference(kc.transmission(model(), inputs, outputs))
 
 
+def function(name: str) -> Any:
+    return reference(name).f
+
+
 def compared(name: str, **given: Any) -> Report:
     report: Report = kc.compare(reference(name), **given)
     return report
@@ -70,7 +75,7 @@ EFFORT = ["-r*sin(motor)*tau_x1 + r*cos(motor)*tau_x2 + tau_phi_crank_2"]
 
 @pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
 def test_that_redundant_rows_and_held_freedoms_change_nothing() -> None:
-    assert reference("parallelogram").f.held == ("phi_pendulum",)
+    assert function("parallelogram").held == ("phi_pendulum",)
     report = compared("parallelogram", J=SLOPES, J_dot=RATES, effort=EFFORT, x=ROUND)
     assert report.verdict == "equal", report.to_text()
     wrong = compared(
@@ -106,7 +111,7 @@ def test_a_loop_with_more_outputs_than_inputs() -> None:
 
 
 def test_a_loop_with_fewer_outputs_than_inputs() -> None:
-    f = reference("half").f
+    f = function("half")
     report = compared("half", J=f.J, J_dot=f.J_dot, effort=f.effort, x=f)
     assert report.verdict == "equal", report.to_text()
     report = compared("half", effort=["tau_x1*u1", "tau_x1*u2"])
@@ -115,7 +120,7 @@ def test_a_loop_with_fewer_outputs_than_inputs() -> None:
 
 def test_that_orders_of_one_hand_in_belong_together() -> None:
     """Alone each order is a convention; beside a right J another one is a mistake."""
-    f = reference("five_bar").f
+    f = function("five_bar")
     u = f.home.u + np.array([[0, 0], [-0.1, 0.05], [0.1, 0.1]])
     u_dot, tau = np.full((3, 2), [0.3, -0.7]), np.full((3, 2), [2.0, 5.0])
     at = {"states": {"u": u, "u_dot": u_dot, "tau_x": tau}}
@@ -146,7 +151,7 @@ def test_that_efforts_of_a_load_belong_to_a_wrong_jacobian_with_their_sign() -> 
 
 
 def test_the_inverse_as_a_function_of_its_own() -> None:
-    g = reference("five_bar").f.inverse
+    g = function("five_bar").inverse
     report = kc.compare(g, J=g.J, J_dot=g.J_dot, effort=g.effort, x=g)
     assert report.verdict == "equal", report.to_text()
     rows = []
@@ -160,7 +165,7 @@ def test_the_inverse_as_a_function_of_its_own() -> None:
 
 
 def test_that_velocities_have_a_jacobian_and_no_x() -> None:
-    f = reference("spin").f
+    f = function("spin")
     report = compared("spin", J=f.J, effort=f.effort)
     assert report.verdict == "equal", report.to_text()
     u = f.home.u + np.array([[0, 0], [0.005, -0.01]])
@@ -207,3 +212,18 @@ def test_that_the_table_of_a_model_says_of_what_a_hand_file_is(tmp_path: Path) -
         result = run.invoke(cli, ["compare", str(model), str(hand)])
         assert result.exit_code == code, result.output
         assert words in result.output
+
+
+def test_that_a_hand_file_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    model, hand = tmp_path / "drive.toml", tmp_path / "hand.txt"
+    model.write_text(models.remote_drive().to_toml(), encoding="utf-8")
+    hand.write_text("transmission = m_1, m_2 : x_1, x_2\nJ = [1/100 0; -1/150 -1/90]", "utf-8")
+    read, own = [], vars(hand_file)["file_content"]
+
+    def counted(*given: Any, **options: Any) -> Any:
+        read.append(given)
+        return own(*given, **options)
+
+    monkeypatch.setattr(hand_file, "file_content", counted)
+    assert CliRunner().invoke(cli, ["compare", str(model), str(hand)]).exit_code == 0
+    assert len(read) == 1

@@ -9,7 +9,7 @@ import pytest
 import kincompile as kc
 from tests import transmission_models as models
 
-ENDS = {
+ENDS: dict[str, Any] = {
     "four_bar": (models.crank_rocker, ["motor"], ["rocker.phi"]),
     "five_bar": (models.five_bar, ["motor_1", "motor_2"], ["end"]),
 }  # with parameters, and without
