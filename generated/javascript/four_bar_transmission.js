@@ -11,6 +11,7 @@
 //     const state = four_bar_transmission.start();
 //     const { x, J, status } = four_bar_transmission.transmission(state, u);
 //     const tau_u = four_bar_transmission.effort(J, tau_x);
+//     const path = four_bar_transmission.transmission_batch(state, [u, ...]);  // arrays of x, J and status
 
 const four_bar_transmission = (() => {
     "use strict";
@@ -398,12 +399,19 @@ const four_bar_transmission = (() => {
         return { x: b.x.slice(), J: b.J.map(row => row.slice()), status };
     }
 
+    // The same for a path of points, each of which goes on from the last that was found: arrays of x, J
+    // and status.
+    function transmission_batch(state, path) {
+        const found = Array.from(path, u => transmission(state, u));
+        return { x: found.map(at => at.x), J: found.map(at => at.J), status: found.map(at => at.status) };
+    }
+
     // What the inputs supply, tau_u = J^T tau_x, where the outputs deliver tau_x.
     const effort = (J, tau_x) => INPUTS.map((_, j) => J.reduce((sum, row, i) => sum + row[j] * tau_x[i], 0));
 
     return {
         INPUTS, OUTPUTS, COORDINATES, PARAMETERS, P, U: U_START, Q, CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE, NOT_REACHED,
-        start, transmission, effort,
+        start, transmission, transmission_batch, effort,
     };
 })();
 

@@ -11,7 +11,8 @@
 //!     let (mut state, status) = four_bar_transmission::start(&P, &START_U, &Q);
 //!     let (x, J, status) = four_bar_transmission::transmission(&mut state, &u);
 //!     let tau_u = four_bar_transmission::effort(&J, &tau_x);
-#![allow(non_snake_case, dead_code, clippy::all)]
+//!     let found = four_bar_transmission::transmission_batch(&mut state, &path, &mut xs, &mut Js, &mut statuses);
+#![allow(non_snake_case, non_upper_case_globals, dead_code, clippy::all)]
 #![allow(unused_parens, unused_variables, unused_mut, unused_comparisons, unused_assignments)]
 
 /// Coordinates that are solved for, parameters, inputs, outputs, blocks of the planned solve.
@@ -72,6 +73,17 @@ pub fn transmission(state: &mut Transmission, u: &[f64; U]) -> ([f64; X], [[f64;
     let mut b = Pose::new();
     let status = transmit(state, *u, &mut b);
     (b.x, b.J, status)
+}
+
+/// The same for a path of points, each of which goes on from the last that was found. x, J and status
+/// are as long as u. Returns how many were found.
+pub fn transmission_batch(
+    state: &mut Transmission, u: &[[f64; U]], x: &mut [[f64; X]], J: &mut [[[f64; U]; X]], status: &mut [usize],
+) -> usize {
+    for k in 0..u.len() {
+        (x[k], J[k], status[k]) = transmission(state, &u[k]);
+    }
+    status[..u.len()].iter().filter(|&&became| became == CONVERGED).count()
 }
 
 /// What the inputs supply, tau_u = J^T tau_x, where the outputs deliver tau_x.

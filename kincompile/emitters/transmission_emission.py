@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 OWN = ("N", "K", "U", "X", "BLOCKS", "ONE", "ANGULAR", "IS_ANGLE", "NOTHING", *NUMBERS, *STATUSES)
 """Constants of the text, which no variable may be called."""
 
-WITH_TABLES = ("numpy", "c")
-"""Targets whose transmissions have splines."""
-
 
 def require_transmission(target: str) -> None:
     """Refuse a target that has none."""
@@ -41,11 +38,6 @@ def emit_transmission(
     """Return the files of a transmission, which begins at a position and its inputs."""
     language = load_transmission(target)
     program = code.code.program
-    if program.tables and target not in WITH_TABLES:
-        raise UnsupportedError(
-            f"{program.name!r} has a spline, which a transmission in {target!r} cannot have; "
-            f"use one of the targets {listed(WITH_TABLES)}"
-        )
     reserved = (*load_target(target).RESERVED, *language.RESERVED, *OWN, program.name)
     table = NameTable((*reserved, *program.tables))
     names = {"t": "t", **{name: table.take(name) for name in code.read}}

@@ -107,6 +107,7 @@ def files(
         "variable": NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(program.name),
         "tables": indented(splines(program, "const {} = {{", "[")),
         "table_names": ", ".join(program.tables),
+        "spline": spline_function(),
         "vectors": indented(vectors(code), 3),
         "solver": "" if listing is None else _solver(program),
         "returned": indented(
@@ -117,6 +118,11 @@ def files(
         ),
     }
     return {f"{program.name}.js": fill("javascript/module.js.jinja", data)}
+
+
+def spline_function() -> str:
+    """Return the function that evaluates a table."""
+    return indented(fill("javascript/spline.js", {}).rstrip().split("\n"))
 
 
 def _solver(program: Program) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
-from kincompile.emitters.constants import items
+from kincompile.emitters.constants import items, splines
 from kincompile.emitters.javascript.functions import WRITE
 from kincompile.emitters.javascript.march import JavaScriptSolver
-from kincompile.emitters.javascript.target import KEYWORDS, TAKEN_BY_ENVIRONMENT
+from kincompile.emitters.javascript.target import KEYWORDS, TAKEN_BY_ENVIRONMENT, spline_function
 from kincompile.emitters.lines import indented, wrapped
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.transmission import NUMBERS, statuses
@@ -48,6 +48,8 @@ def files(of: Transmission) -> Mapping[str, str]:
         "flags": indented(
             f"const {x} = [{', '.join(items(map(bool, own)))}];" for x, own in of.tables.items()
         ),
+        "tables": indented(splines(of.of.code.program, "const {} = {{", "[")),
+        "spline": spline_function(),
         "statuses": ", ".join(statuses()),
         "body": indented(of.evaluation(WRITE.of_pose("{}[{}]", "{}[{}][{}]")), 2),
         "has_square": any("square(" in x for x in of.evaluation(WRITE)),

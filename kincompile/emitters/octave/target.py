@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from kincompile.emitters.evaluators import Listing
     from kincompile.emitters.planned_solve import BlockCall
     from kincompile.ir.inline import InlineProgram
+    from kincompile.ir.program import Program
     from kincompile.model.spline import SplineTable
 
 # Complex for some real numbers, where the other targets have NaN.
@@ -106,8 +107,7 @@ def files(
         found[f"{program.name}_assemble"] = _assembly(code)
     for name, lines in functions.items():
         found[f"{program.name}_{name}"] = _function_file(name, code, "\n".join(lines))
-    for name, spline in program.tables.items():
-        found[f"{program.name}_{name}"] = _spline(f"{program.name}_{name}", spline)
+    found |= splines_of(program)
     require_short(found)
     return {f"{name}.m": text for name, text in found.items()}
 
@@ -153,8 +153,14 @@ def _column(items: Iterable[tuple[str, float | None]], level: int) -> str:
     return "\n".join(f"{'    ' * level}{value!r}  % {name}" for name, value in items)
 
 
+def splines_of(program: Program) -> dict[str, str]:
+    """Return the functions of tables by name."""
+    names = {f"{program.name}_{name}": spline for name, spline in program.tables.items()}
+    return {name: _spline(name, spline) for name, spline in names.items()}
+
+
 def _spline(name: str, spline: SplineTable) -> str:
-    """Return the file of a table."""
+    """Return the function of a table."""
     pieces = (", ".join(map(repr, row)) for row in spline.coefficients)
     data = {
         "name": name,

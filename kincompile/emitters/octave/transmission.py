@@ -1,4 +1,4 @@
-"""A transmission in Octave, which is MATLAB too: one function."""
+"""A transmission in Octave, which is MATLAB too: a function, and one for paths."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from kincompile.emitters.constants import items
 from kincompile.emitters.lines import indented
 from kincompile.emitters.octave.loops import nodes_in
 from kincompile.emitters.octave.march import OctaveSolver
-from kincompile.emitters.octave.target import WRITE, called_in, require_short
+from kincompile.emitters.octave.target import WRITE, called_in, require_short, splines_of
 from kincompile.emitters.transmission import NUMBERS, statuses
 from kincompile.report.templates import fill
 from kincompile.solver.nodes import Index
@@ -36,9 +36,10 @@ class _Solver(OctaveSolver):
 
 
 def files(of: Transmission) -> Mapping[str, str]:
-    """Return the .m file; refuse names longer than MATLAB reads."""
+    """Return the .m files; refuse names longer than MATLAB reads."""
     name = f"{of.name}_transmission"
-    require_short([name, *of.listing.names.values()])
+    path, tables = f"{name}_batch", splines_of(of.of.code.program)
+    require_short([path, *of.listing.names.values(), *tables])
     body = of.evaluation(WRITE, first=1)
     solver = _Solver(transmission(), {**of.sizes, **STATUSES, **NUMBERS})
     data = {
@@ -51,7 +52,12 @@ def files(of: Transmission) -> Mapping[str, str]:
         ),
         "statuses": ", ".join(f"{n} {x}" for x, n in statuses().items()),
         "body": indented(body, 0),
-        "functions": called_in("\n".join(body)),
+        "functions": called_in("\n".join(body)) + "".join(f"\n{x}" for x in tables.values()),
         "solver": solver.text(),
     }
-    return {f"{name}.m": fill("octave/transmission.m.jinja", data).rstrip("\n") + "\n"}
+    ends = {"name": name, "inputs": len(of.of.inputs), "outputs": len(of.of.outputs)}
+    batch = fill("octave/transmission_batch.m.jinja", ends)
+    return {
+        f"{name}.m": fill("octave/transmission.m.jinja", data).rstrip("\n") + "\n",
+        f"{path}.m": batch,
+    }

@@ -83,12 +83,20 @@ def files(
         "module": module,
         "header": WRITE.heading(code).replace("// ", "//! ").replace("//\n", "//!\n"),
         "constants": indented(_constants(code), 0),
-        "tables": indented(splines(program, "static {}: Spline = Spline {{", "&["), 0),
+        "splines": splines_of(program),
         "fields": indented(fields),
         "values": indented(values, 3),
         "march": "" if listing is None else fill("rust/march.rs.jinja", _march(program)),
     }
     return {f"{module}.rs": fill("rust/module.rs.jinja", data)}
+
+
+def splines_of(program: Program) -> str:
+    """Return the tables of splines with what evaluates them; none where there are none."""
+    if not program.tables:
+        return ""
+    tables = indented(splines(program, "static {}: Spline = Spline {{", "&["), 0)
+    return fill("rust/spline.rs.jinja", {"tables": tables}).rstrip()
 
 
 def _constants(code: InlineProgram) -> list[str]:

@@ -8,6 +8,7 @@ from kincompile.emitters.constants import items
 from kincompile.emitters.lines import indented
 from kincompile.emitters.rust.functions import WRITE
 from kincompile.emitters.rust.march import BASES, SIZES, RustSolver
+from kincompile.emitters.rust.target import splines_of
 from kincompile.emitters.transmission import NUMBERS, statuses
 from kincompile.report.templates import fill
 from kincompile.solver.reader import transmission
@@ -63,6 +64,7 @@ def files(of: Transmission) -> Mapping[str, str]:
         **{x: ", ".join(repr(float(y)) for y in getattr(of, x)) for x in ("p", "u", "q")},
         "size": repr(of.of.size),
         "numbers": "\n".join([*numbers, *flags]),
+        "splines": splines_of(of.of.code.program),
         "has_square": any("square(" in x for x in body),
         "body": indented(body),
         "solver": _Solver(transmission()).text(),
