@@ -36,6 +36,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+TOGETHER = ("tests/targets/", "tests/unit/files/test_hostile.py")
+"""Tests of one process, slow ones too: what each target says of all mechanisms, and what becomes of
+all hostile files, takes a minute and more to find out."""
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Return what gives tests to processes with `--dist=loadfile`, as the Makefile asks."""
@@ -44,15 +49,13 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     from xdist.scheduler import LoadScopeScheduling  # several processes are optional
 
     class Together(LoadScopeScheduling):  # type: ignore[misc]
-        """One process has the tests of a file, which share what is made once; long ones go alone.
-
-        The tests of the targets share what each target says of all mechanisms.
-        """
+        """One process has the tests of a file, which share what is made; slow ones go alone."""
 
         def _split_scope(self, nodeid: str) -> str:
             path, _, _ = nodeid.partition("::")
-            if path.startswith("tests/targets/"):
-                return "tests/targets"
+            for place in TOGETHER:
+                if path.startswith(place):
+                    return place
             return nodeid if config.option.markexpr == "slow" else path
 
     return Together(config, log)

@@ -58,32 +58,89 @@ def interpret(
     is (..., m), Phi_q (..., m, n), and so on; outputs, or M, Q and its Jacobians, come where there
     are any.
     """
-    q, q_dot = np.asarray(q), np.asarray(q_dot)
-    q_ddot = 0 * q if q_ddot is None else np.asarray(q_ddot)
-    values = run(program.values, inputs_of(program, (q, q_dot, q_ddot), t, p), program.tables)
+    return interpreter(program)(q, q_dot, t, p, q_ddot)
 
-    shape = q.shape[:-1]
-    dtype = np.result_type(q, q_dot, q_ddot, t, float)
-    every = np.empty((*shape, len(values)), dtype)
-    for node, value in enumerate(values):
-        every[..., node] = value
-    found = [np.zeros((*shape, *program.shape_of(item)), dtype) for item in program.quantities]
-    for kernel, instances in by_kernel(program):
-        bindings = np.array([instance.bindings for instance in instances], dtype=np.intp)
-        bound = {name: every[..., bindings[:, k]] for k, name in enumerate(kernel.inputs)}
-        results = run(kernel.nodes, bound, program.tables)
-        placed = Placed.of(instances)
-        for quantity, array in zip(program.quantities, found, strict=True):
-            for row, column, node in kernel.outputs.get(quantity.name, ()):
-                rows, columns = placed.entry(quantity, row, column)
-                moving = (rows >= 0) & (columns >= 0)
-                entries = np.broadcast_to(results[node], (*shape, len(instances)))[..., moving]
-                at: Any = (..., rows[moving], columns[moving])[: 2 + quantity.is_matrix]
-                if quantity.adds:
-                    np.add.at(array, at, entries)
+
+def interpreter(
+    program: Program, wanted: Sequence[str] | None = None
+) -> Callable[..., tuple[Array, ...]]:
+    """Return what evaluates some quantities as `interpret` does all, and nothing but these.
+
+    What they need of the code, and where their entries stand, is found once.
+    """
+    quantities = [item for item in program.quantities if wanted is None or item.name in wanted]
+    parts = [_Part.of(kernel, instances, quantities) for kernel, instances in by_kernel(program)]
+    shared, number = pruned(
+        program.values, {k for part in parts for some in part.bound.values() for k in some}
+    )
+    bindings = [
+        {name: np.array([number[k] for k in some]) for name, some in part.bound.items()}
+        for part in parts
+    ]
+
+    def evaluate(
+        q: Array, q_dot: Array, t: Any, p: Array | None = None, q_ddot: Array | None = None
+    ) -> tuple[Array, ...]:
+        q, q_dot = np.asarray(q), np.asarray(q_dot)
+        q_ddot = 0 * q if q_ddot is None else np.asarray(q_ddot)
+        values = run(shared, inputs_of(program, (q, q_dot, q_ddot), t, p), program.tables)
+
+        shape = q.shape[:-1]
+        dtype = np.result_type(q, q_dot, q_ddot, t, float)
+        every = np.empty((*shape, len(values)), dtype)
+        for node, value in enumerate(values):
+            every[..., node] = value
+        found = [np.zeros((*shape, *program.shape_of(item)), dtype) for item in quantities]
+        for part, bound in zip(parts, bindings, strict=True):
+            inputs = {name: every[..., some] for name, some in bound.items()}
+            results = run(part.nodes, inputs, program.tables)
+            for place, node, moving, at in part.entries:
+                entries = results[node]
+                if np.ndim(entries):
+                    entries = entries[..., moving]
+                if quantities[place].adds:
+                    np.add.at(found[place], at, entries)
                 else:
-                    array[at] = entries
-    return tuple(found)
+                    found[place][at] = entries
+        return tuple(found)
+
+    return evaluate
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """What some quantities need of the instances of a kernel, which run together."""
+
+    nodes: Sequence[Node]
+    bound: Mapping[Any, Sequence[int]]  # for each input the shared value of each instance
+    # Quantity, node, which instances have an entry (not on the ground), and the indices of these.
+    entries: Sequence[tuple[int, int, Array, Any]]
+
+    @classmethod
+    def of(
+        cls, kernel: Kernel, instances: Sequence[Instance], quantities: Sequence[Quantity]
+    ) -> _Part:
+        """Return what they need, and where their entries stand."""
+        outputs = [
+            (place, *entry)
+            for place, quantity in enumerate(quantities)
+            for entry in kernel.outputs.get(quantity.name, ())
+        ]
+        nodes, number = pruned(kernel.nodes, [node for *_, node in outputs])
+        names = {node[1] for node in nodes if node[0] == "input"}
+        bound = {
+            name: [instance.bindings[k] for instance in instances]
+            for k, name in enumerate(kernel.inputs)
+            if name in names
+        }
+        placed, entries = Placed.of(instances), list[tuple[int, int, Array, Any]]()
+        for place, row, column, node in outputs:
+            quantity = quantities[place]
+            rows, columns = placed.entry(quantity, row, column)
+            moving = (rows >= 0) & (columns >= 0)
+            at = (..., rows[moving], columns[moving])[: 2 + quantity.is_matrix]
+            entries.append((place, number[node], moving, at))
+        return cls(nodes, bound, entries)
 
 
 def inputs_of(program: Program, states: Sequence[Array], t: Any, p: Any) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import StructuralError
-from kincompile.ir.interpret import interpret
+from kincompile.ir.interpret import interpreter
 from kincompile.ir.lower import lower
 from kincompile.model.resolve import Joint
 from kincompile.names import listed, rate
@@ -62,11 +62,12 @@ def rank_report(
 
 def _evaluation(program: Program) -> Evaluate:
     """Return what gives Phi and Phi_q at states, with default parameters."""
+    found = interpreter(program, ("Phi", "Phi_q"))
 
     def evaluate(
         q: NDArray[np.float64], t: NDArray[np.float64]
     ) -> tuple[NDArray[Any], NDArray[Any]]:
-        Phi, Phi_q, *_ = interpret(program, q, np.zeros_like(q), t)
+        Phi, Phi_q = found(q, np.zeros_like(q), t)
         return Phi, Phi_q
 
     return evaluate

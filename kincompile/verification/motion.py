@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import COMPLEX_STEP
-from kincompile.ir.interpret import interpret
+from kincompile.ir.interpret import interpreter
 from kincompile.ir.lower import lower
 from kincompile.quantities import TOGETHER, states_of
 from kincompile.verification.oracles import DIFFERENCE, slope
@@ -61,12 +61,10 @@ def _errors_of_loads(samples: Samples, model: ConstraintSystem | None) -> Iterat
     yield from _rows("M", names, "its own transpose", _errors(M, transposed, both), EXACT)
     yield from _rows("M", names, "energy of movements", energy[..., np.newaxis], EXACT)
     if model is not None:
-        program = lower(model)
         states = [np.array(x) for x in zip(*samples.each(), strict=True)]
-        known = interpret(program, states[0], states[1], states[2], states[3].T)
-        of = dict(zip([item.name for item in program.quantities], known, strict=True))
-        yield from _rows("M", names, "the model", _errors(M, of["M"], both), EXACT)
-        yield from _rows("Q", names, "the model", _errors(Q, of["Q"], scale), EXACT)
+        of_model = interpreter(lower(model), ("M", "Q"))(*states[:3], states[3].T)
+        yield from _rows("M", names, "the model", _errors(M, of_model[0], both), EXACT)
+        yield from _rows("Q", names, "the model", _errors(Q, of_model[1], scale), EXACT)
     else:  # functions of states and of batches are written out apart
         yield from _rows("M", names, "its other forms", _errors(M, M[0], both), EXACT)
         yield from _rows("Q", names, "its other forms", _errors(Q, Q[0], scale), EXACT)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.ir.interpret import interpret
+from kincompile.ir.interpret import interpreter
 from kincompile.ir.lower import lower
 from kincompile.verification.oracles import DIFFERENCE, slope
 
@@ -75,9 +75,7 @@ def _of_model(
     model: ConstraintSystem, q: Array, q_dot: Array, q_ddot: Array, t: Array, p: Array
 ) -> Array:
     """Return the outputs by the interpreter."""
-    program = lower(model)
-    place = [item.name for item in program.quantities].index("outputs")
-    return interpret(program, q, q_dot, t, p.T, q_ddot)[place]
+    return interpreter(lower(model), ("outputs",))(q, q_dot, t, p.T, q_ddot)[0]
 
 
 def _differences(function: Callable[[float], Array]) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 import kincompile.compiler as compiler
 from kincompile.errors import RedundantConstraintWarning
 from kincompile.html import Shown
-from kincompile.ir.interpret import interpret
+from kincompile.ir.interpret import interpreter
 from kincompile.ir.lower import lower
 from kincompile.model.system import model_of
 from kincompile.quantities import OF_EQUATIONS, QUANTITIES
@@ -266,8 +266,8 @@ def _Phi_of_model(module: ModuleType) -> PhiOfParameters | None:
     system = model_of(module)
     if system is None:
         return None
-    program = lower(system)
-    return lambda q, t, p: interpret(program, q, np.zeros_like(q), t, p)[0]
+    found = interpreter(lower(system), ("Phi",))
+    return lambda q, t, p: found(q, np.zeros_like(q), t, p)[0]
 
 
 def _checks_of_solve(samples: Samples) -> Iterator[Check]:

@@ -6,6 +6,7 @@ and parameters that the verification has not seen.
 
 import ast
 import io
+import os
 import re
 import tokenize
 from dataclasses import dataclass
@@ -195,6 +196,9 @@ EVERY = [
     *(("four_bar", "grouped", 1), ("coupled", "grouped", 2)),
 ]
 
+SHARE = 1 if "ADVERSARY_REPORT" in os.environ else 3
+"""Part of the turned signs of dynamics in the slow suite; `python -m tests.adversary` turns all."""
+
 UNSEEN_OF_A_FILE = 3
 """Turned signs of a module from a file that no oracle sees: values of outputs are believed, and so
 is M where it is multiplied by nothing, since an evenly driven crank has no acceleration."""
@@ -261,7 +265,8 @@ def test_that_a_turned_sign_of_dynamics_is_found(driven, is_known, every, tmp_pa
     original = kc.load(path)
     assert kc.verify(remember_model(original, model.system())).passed
     known, unseen, equivalent = numbers(original), [], 0
-    chosen = list(mutants(path.read_text(encoding="utf-8"), "inline"))[::every]
+    chosen = list(mutants(path.read_text(encoding="utf-8"), "inline"))
+    chosen = chosen[:: every if every > 1 else SHARE]
     for mutant in chosen:
         is_found, module = verdict(path, mutant, system)
         if not is_found and is_equivalent(module, known, may_refuse=True):

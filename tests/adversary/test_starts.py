@@ -199,7 +199,7 @@ def test_that_chains_end_alike_in_javascript(tmp_path):
 @needs_node
 @pytest.mark.slow
 def test_that_many_chains_end_alike_in_javascript(tmp_path):
-    assert motions_in_javascript(range(6, 60), tmp_path) >= 18
+    assert motions_in_javascript(range(6, 6 + 54 // SHARE), tmp_path) >= 18 // SHARE
 
 
 @needs_node
