@@ -53,6 +53,11 @@ instructions in time that grows with the square of a function's length. Beyond, 
 a quarter of the speed, and 99 coordinates take 3 s instead of minutes."""
 ANGLE = 3_000
 
+LONGEST_OPTIMIZED = 400_000
+"""Characters of one function up to which it is optimized at all: gcc's choice of registers takes 11
+s for 330,000, and ten minutes for the 1,600,000 of second derivatives of an ankle with four bodies
+in its legs, which take 2 s as they are, and then no longer a point than NumPy does."""
+
 TRIAL = "import ctypes, sys; ctypes.CDLL(sys.argv[1])"
 
 MOST_LINES = 20
@@ -69,9 +74,7 @@ def library(name: str, files: Mapping[str, str], fingerprint: str) -> ctypes.CDL
     of itself. An `UnsupportedError` says what is wrong with the compiler.
     """
     source = next(iter(files.values()))
-    is_large = len(source) + ANGLE * source.count("cos_sin(") > LARGEST_VECTORIZED
-    level = "-O1" if is_large else "-O3"
-    command = (*_compiler(), level, *FLAGS, *_machine_flags())
+    command = (*_compiler(), _level(source), *FLAGS, *_machine_flags())
     digest = hashlib.sha256()
     for part in (*command, _version(command[0]), _processor(), *files, *files.values()):
         digest.update(part.encode() + b"\0")
@@ -94,6 +97,14 @@ def library(name: str, files: Mapping[str, str], fingerprint: str) -> ctypes.CDL
             f"the C code of {name} cannot be built in the temporary folder: {error.strerror}. Free "
             f"some space or set TMPDIR to another folder, {ALTERNATIVE}."
         ) from error
+
+
+def _level(source: str) -> str:
+    """Return how far code is optimized: as far as it does not take a minute."""
+    if max(map(len, source.split("\n}\n"))) > LONGEST_OPTIMIZED:
+        return "-O0"
+    is_large = len(source) + ANGLE * source.count("cos_sin(") > LARGEST_VECTORIZED
+    return "-O1" if is_large else "-O3"
 
 
 def _compiler() -> tuple[str, ...]:

@@ -170,11 +170,16 @@ def test_arguments_beside_the_name_reach_the_compiler(monkeypatch, compiler, cac
     assert (tmp_path / "seen").read_text().startswith("-DEXTRA=1 -O3 -std=c99")
 
 
-def test_large_sources_are_not_optimized_for_minutes(monkeypatch, compiler, cache, tmp_path):
+@pytest.mark.parametrize(
+    ("limit", "level"), [("LARGEST_VECTORIZED", "-O1"), ("LONGEST_OPTIMIZED", "-O0")]
+)
+def test_large_sources_are_not_optimized_for_minutes(
+    monkeypatch, compiler, cache, tmp_path, limit, level
+):
     compiler(f'echo "$1" > {tmp_path}/seen; exec REAL "$@"')
-    monkeypatch.setattr(c_library, "LARGEST_VECTORIZED", 1000)
+    monkeypatch.setattr(c_library, limit, 1000)
     assert_right(kc.compile(tiny(), target="c"))
-    assert (tmp_path / "seen").read_text() == "-O1\n"
+    assert (tmp_path / "seen").read_text() == f"{level}\n"
 
 
 # ---------------------------------------------------------------- the cache
