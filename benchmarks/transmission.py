@@ -1,9 +1,9 @@
 """Loops as functions: emitted C beside plain C by hand, 20,000 points along a smooth path.
 
 `python -m benchmarks.transmission` prints the time of x, J and J^T tau of a point, in one call for
-the path and in one for each point, and the ratio to the peer, in one run: a crank-rocker and a
-delta in closed form, an ankle by Newton's method. Then with more than is needed, beside the leanest
-model: a joint that is there twice, and cylinders and rods as bodies.
+the path and in one for each point, in one call of the NumPy module, and the ratio to the peer, in
+one run: a crank-rocker and a delta in closed form, an ankle by Newton's method. Then with more than
+is needed, beside the leanest model: a joint that is there twice, and cylinders and rods as bodies.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 PEERS = Path(__file__).with_name("peers") / "transmissions.c"
 POINTS, ROUNDS = 20_000, 40
-LIMIT, ONE_CALL, FULL = 1.0, 1.5, 1.5
+LIMIT, ONE_CALL, FULL, IN_NUMPY = 1.0, 1.5, 1.5, 4.0
 KINDS = "batch", "follow", "by_hand"
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")
 
@@ -95,18 +95,20 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         for name, case in cases().items():
             calls = calls_of(name, case, compiler, Path(folder))
+            calls["numpy"] = in_numpy(case)
             found = in_turn(calls, calls=1, rounds=ROUNDS)
-            times = [1e9 / POINTS * found[x].least for x in KINDS]
+            times = [1e9 / POINTS * found[x].least for x in (*KINDS, "numpy")]
             rows.append([name, *(f"{x:.0f}" for x in times)])
             batches[name] = times[0]
             if name != case.peer:
                 part = times[0] / batches[case.peer]
                 targets.append(Target(f"{name}: a batch, x {case.peer}", part, "at most", FULL))
                 continue
-            batch, single = (x / times[-1] for x in times[:2])
+            batch, single, _, arrays = (x / times[2] for x in times)
             targets.append(Target(f"{name}: a batch, x plain C", batch, "at most", LIMIT))
             targets.append(Target(f"{name}: call by call, x plain C", single, "at most", ONE_CALL))
-    head = "loop", "emitted C, a batch", "call by call", "by hand"
+            targets.append(Target(f"{name}: NumPy, x plain C", arrays, "at most", IN_NUMPY))
+    head = "loop", "emitted C, a batch", "call by call", "by hand", "NumPy, a batch"
     print_table("x, J and J^T tau, ns a point", head, rows)
     print_targets("Loops as functions: what was to be reached", targets)
     print(f"{machine.description()}. Load before {before}, after {machine.load()}.")
@@ -150,6 +152,21 @@ def calls_of(name: str, case: Case, compiler: str, folder: Path) -> dict[str, Ca
             np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.abs(there).max())
     kept.append((case, tau, found))
     return dict(zip(KINDS, calls, strict=True))
+
+
+def in_numpy(case: Case) -> Callable[[], object]:
+    """Return what follows a path by the emitted NumPy module, in one call."""
+    module: dict[str, Any] = {}
+    exec(kc.emit(case.model, transmission=(case.inputs, case.outputs)).source, module)
+    tau = np.tile(np.linspace(1.0, 2.0, len(case.outputs)), (POINTS, 1))
+
+    def follow() -> None:
+        state, _ = module["start"]()
+        _, slopes, status = module["transmission_batch"](state, case.path)
+        module["effort"](slopes, tau)
+        assert not status.any()
+
+    return follow
 
 
 kept: list[object] = []

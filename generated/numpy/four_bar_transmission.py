@@ -9,13 +9,18 @@ p     a [m], b [m], c [m], d [m], omega [rad/s]
     state, status = start()
     x, J, status = transmission(state, u)
     tau_u = effort(J, tau_x)
+    x, J, status = transmission_batch(state, path)
 
-u, x, q and p are sequences of numbers, J a list of rows: floats throughout, for a control loop.
+u, x, q and p are sequences of numbers, J a list of rows: floats throughout, for a control loop. Of
+a path all are arrays, whose first axis is the point.
 """
 
+import copy
 import math
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.polynomial.chebyshev import chebvander
 
 INPUTS = ("motor",)
 OUTPUTS = ("phi_rocker",)
@@ -60,8 +65,34 @@ def transmission(state, u):
     return b.x, b.J, status
 
 
+def transmission_batch(state, u):
+    """Outputs, Jacobians and statuses of a path of inputs u (B, m), many points side by side.
+
+    Each position is on the way from that before, as by calls of `transmission` one after the other;
+    the state is then at the last one that was found. Neighbours that are far apart, or near a
+    singular position, go one by one. Returns arrays (B, n), (B, n, m) and (B,).
+    """
+    u = np.array(u, dtype=float)
+    if u.ndim != 2 or u.shape[1] != len(INPUTS):
+        raise ValueError(f"u has the shape {u.shape}, not (B, {len(INPUTS)}): {', '.join(INPUTS)}")
+    count, path = len(u), u.T.copy()
+    x, J = np.empty((count, _X)), np.empty((count, _X, _U))
+    status = np.zeros(count, dtype=int)
+    k, alone = 0, _SHORT  # as many go one by one where neighbours fail
+    while k < count:
+        done = _stride(state, path[:, k:], x[k:], J[k:])
+        k += done
+        alone = _SHORT if done else 2 * alone
+        for k in range(k, min(k + alone, count)):
+            x[k], J[k], status[k] = transmission(state, u[k])
+        k += 1
+    return x, J, status
+
+
 def effort(J, tau_x):
     """What the inputs supply, tau_u = J^T tau_x, where the outputs deliver tau_x."""
+    if isinstance(J, np.ndarray):
+        return np.einsum("...ij,...i->...j", J, tau_x)
     return [sum(row[j] * tau for row, tau in zip(J, tau_x)) for j in range(len(INPUTS))]
 
 
@@ -426,3 +457,133 @@ def _begin(s, u, q, b):
             s.bend[i] = 0.0
             s.twist[i] = 0.0
     return _ends(status, b)
+
+
+# ---- a path, side by side: some positions one after the other, those between them by polynomials
+# through their neighbours and Newton's method, twice; then every one is looked at beside the next
+
+_SHORT, _STRIP, _DEGREE = 100, 4000, 7
+_SCALES = np.array([1.0 if x else SIZE for x in _ANGULAR[:_N]])
+_OF_INPUTS = np.array([1.0 if x else SIZE for x in _IS_ANGLE[:_U]])
+
+
+def _stride(state, u, x, J):
+    """Go on along inputs (m, B) as far as neighbours follow each other; return how many points.
+
+    x (B, n) and J (B, n, m) are filled in.
+    """
+    count = u.shape[1]
+    while count > _SHORT:
+        # intervals of the first positions, and parts of these, so that few points are left over
+        first = max(1, count // 1000)
+        sizes = ((g, r) for r in range(first, first + 3) for g in range(24, 36))
+        g, r = min(sizes, key=lambda x: (count - 1) % (x[0] * x[1]) / ((count - 1) // (x[0] * x[1])))
+        part = (count - 1) // (g * r)
+        ahead, found = copy.deepcopy(state), []
+        for k in range(0, g * r * part + 1, r * part):
+            if _transmit(ahead, u[:, k].tolist(), _Pose()) != CONVERGED:
+                break
+            found.append([*ahead.q, *(slope for row in ahead.slopes for slope in row)])
+        if len(found) <= g:
+            count = max(len(found) - 1, 0) * r * part + 1
+            continue
+        found = np.array(found).T
+        found = {"q": found[:_N], "slopes": found[_N:]}
+        with np.errstate(all="ignore"):
+            if r > 1:
+                found = _between(state, u[:, : g * r * part + 1 : part], found, r)
+                if np.isnan(found["q"]).any():  # the first ones are too far apart
+                    count //= 2
+                    continue
+            found = _between(state, u[:, :count], found, part)
+            good = _linked(state, found)
+        if good:
+            _take(state, found, good)
+            x[:good] = found["x"].T[:good]
+            J[:good] = found["J"].T[:good].reshape(good, _X, _U)
+        return good
+    return 0
+
+
+def _between(state, u, found, parts):
+    """Positions at inputs (m, B) that begin with every `parts`-th of them, which are found.
+
+    Returns arrays by the vectors of a pose, with the point as their last axis; q is NaN where
+    Newton's method does not converge.
+    """
+    nodes = np.concatenate((found["q"], u[:, ::parts]))
+    known, count = nodes.shape[1], u.shape[1]
+    degree = min(_DEGREE, known - 1)
+    ends = np.arange(degree + 1)
+    at = ends[:, np.newaxis] + np.arange(parts) / parts
+    basis = (chebvander(2.0 * x / degree - 1.0, degree) for x in (at, ends))
+    weights = np.matmul(next(basis), np.linalg.inv(next(basis)))  # by the interval among its nodes
+    guess = np.empty((_N + _U, known, parts))
+    middle = degree // 2
+    inner = slice(middle, middle + known - degree)
+    guess[:, inner] = sliding_window_view(nodes, degree + 1, axis=1) @ weights[middle].T
+    for k in (*range(middle), *range(middle + 1, degree + 1)):
+        begin, interval = (0, k) if k < middle else (known - 1 - degree, known - 1 - degree + k)
+        guess[:, interval] = nodes[:, begin : begin + degree + 1] @ weights[k].T
+    away = np.zeros((_U, known * parts))
+    away[:, :count] = u - guess[_N:].reshape(_U, -1)[:, :count]
+    slopes = found["slopes"].reshape(_N, _U, known, 1)
+    for j in range(_U):
+        guess[:_N] += slopes[:, j] * away[j].reshape(known, parts)
+    return _corrected(state, u, guess[:_N].reshape(_N, known * parts)[:, :count])
+
+
+def _corrected(state, u, q):
+    """Correct positions (N, B) at inputs (m, B), side by side; returns as `_between`."""
+    widths = {"change": _N, "slopes": _N * _U, "x": _X, "J": _X * _U}
+    widths |= {"determinants": _BLOCKS, "missed": 1}
+    values = np.empty((sum(widths.values()), q.shape[1]))
+    ends = np.cumsum(list(widths.values()))
+    table = dict(zip(widths, np.split(values, ends[:-1])))
+    moved, rest = np.zeros(q.shape[1]), np.arange(q.shape[1])
+    for _ in range(_MAX_CORRECTIONS):
+        is_all = len(rest) == q.shape[1]
+        for k in range(0, len(rest), _STRIP):
+            lanes = slice(k, k + _STRIP) if is_all else rest[k : k + _STRIP]
+            for row, value in zip(values, _code(ARRAYS, state.p, u[:, lanes], q[:, lanes])):
+                row[lanes] = value
+        lanes = slice(None) if is_all else rest
+        change = table["change"][:, lanes]
+        q[:, lanes] -= change
+        size = np.max(np.abs(change) / _SCALES[:, np.newaxis], axis=0, initial=0.0)
+        moved[lanes] += size
+        rest = rest[(size > _LAST_CORRECTION) & (moved[lanes] <= _SMALL_ERROR)]
+        if not rest.size:
+            break
+    lost = ~(moved <= _SMALL_ERROR) | ~(table["missed"][0] <= _SOLVED)
+    lost[rest] = True
+    q[:, lost] = np.nan
+    return table | {"u": u, "q": q}
+
+
+def _linked(state, found):
+    """How many positions follow from each other, the first of them from the state's.
+
+    Those near a singular position are for single steps to judge.
+    """
+    last = {x: np.ravel(getattr(state, x))[:, np.newaxis] for x in ("u", "q", "slopes")}
+    u, q, slopes = (np.concatenate((last[x], found[x]), axis=1) for x in last)
+    step, way = np.diff(q, axis=1), np.diff(u, axis=1)
+    slopes = slopes.reshape(_N, _U, slopes.shape[1])
+    apart = step - np.sum(0.5 * (slopes[..., 1:] + slopes[..., :-1]) * way, axis=1)
+    steep = _NEARLY_SINGULAR * _SCALES[:, np.newaxis, np.newaxis] / _OF_INPUTS[:, np.newaxis]
+    good = np.all(np.abs(step) <= _LARGE_ERROR * _SCALES[:, np.newaxis], axis=0)
+    good &= np.all(np.abs(apart) <= _SMALL_ERROR * _SCALES[:, np.newaxis], axis=0)
+    good &= np.all(np.abs(slopes[..., 1:]) <= steep, axis=(0, 1))
+    before = np.array(state.determinants)[:, np.newaxis]
+    good &= np.all(found["determinants"] * before > 0.0, axis=0)
+    return len(good) if good.all() else int(np.argmin(good))
+
+
+def _take(state, found, good):
+    """Take the last of good positions as the state, by way of that before."""
+    for k in (good - 2, good - 1) if good > 1 else (0,):
+        b = _Pose()
+        b.u, b.q, b.determinants = (found[x][:, k].tolist() for x in ("u", "q", "determinants"))
+        b.slopes = found["slopes"][:, k].reshape(_N, _U).tolist()
+        _accept(state, b)

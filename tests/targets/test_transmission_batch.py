@@ -1,10 +1,11 @@
-"""A batch of points in emitted C: the same as one by one, and what closed forms give."""
+"""A batch of points in emitted C and NumPy: the same as one by one, and what closed forms give."""
 
 import ctypes
 import json
 import math
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,17 +72,51 @@ def at(array):
     return ctypes.c_void_p(array.ctypes.data)
 
 
-@pytest.fixture
-def four_bar(tmp_path, quick_compiler):
+class Module:
+    """The functions of a transmission in NumPy."""
+
+    def __init__(self, model, ends):
+        self.module: dict[str, Any] = {}
+        exec(kc.emit(model, transmission=ends).source, self.module)
+        self.begin()
+
+    def begin(self):
+        """Begin at the position of the model."""
+        self.state, status = self.module["start"]()
+        assert status == 0
+
+    def batch(self, u, tau):
+        """Return the same as of a library, of a path in one call."""
+        x, slopes, status = self.module["transmission_batch"](self.state, u)
+        efforts = self.module["effort"](slopes, tau)
+        return (x, slopes, efforts, status), int((status == 0).sum())
+
+    def one_by_one(self, u, tau):
+        """Return the same from one call for each point."""
+        self.begin()
+        found = [self.module["transmission"](self.state, point) for point in u]
+        efforts = [self.module["effort"](x[1], own) for x, own in zip(found, tau, strict=True)]
+        x, slopes, status = (np.array(x) for x in zip(*found, strict=True))
+        return x, slopes, np.array(efforts), status
+
+
+def follower(target, model, ends, folder, compiler):
+    """Return a model as a function, in a target."""
+    return Module(model, ends) if target == "numpy" else Library(model, ends, folder, compiler)
+
+
+@pytest.fixture(params=["c", "numpy"])
+def four_bar(request, tmp_path, quick_compiler):
     """T1a."""
-    return Library(models.crank_rocker(), (["motor"], ["phi_rocker"]), tmp_path, quick_compiler)
+    ends = ["motor"], ["phi_rocker"]
+    return follower(request.param, models.crank_rocker(), ends, tmp_path, quick_compiler)
 
 
-@pytest.fixture
-def ankle(tmp_path, quick_compiler):
+@pytest.fixture(params=["c", "numpy"])
+def ankle(request, tmp_path, quick_compiler):
     """T3-SPU."""
     ends = ["left", "right"], ["pitch", "roll"]
-    return Library(models.ankle(), ends, tmp_path, quick_compiler)
+    return follower(request.param, models.ankle(), ends, tmp_path, quick_compiler)
 
 
 def same(found, wanted):
@@ -143,7 +178,9 @@ def test_points_beyond_a_singular_position_have_a_status_each(ankle):
     np.testing.assert_allclose(found[0][-1], 0, atol=2e-3)
 
 
-def test_what_is_not_wanted_may_be_left_out(four_bar):
+def test_what_is_not_wanted_may_be_left_out(tmp_path, quick_compiler):
+    ends = ["motor"], ["phi_rocker"]
+    four_bar = Library(models.crank_rocker(), ends, tmp_path, quick_compiler)
     u = np.linspace(1.5, 2.5, 50)[:, np.newaxis]
     (x, *_), _ = four_bar.batch(u, np.ones((50, 1)))
     only = np.empty((50, 1))
@@ -153,3 +190,68 @@ def test_what_is_not_wanted_may_be_left_out(four_bar):
     assert four_bar.batch_of(*given) == 50
     np.testing.assert_array_equal(only, x)
     assert four_bar.batch_of(at(four_bar.state), ctypes.c_size_t(0), *(None,) * 6) == 0
+
+
+def test_numpy_goes_side_by_side_and_neighbours_far_apart_go_alone():
+    """A smooth path takes about one evaluation a point, in arrays."""
+    ends = ["left", "right"], ["pitch", "roll"]
+    ankle, counts = Module(models.ankle(), ends), {"ARRAYS": 0, "FLOATS": 0}
+    code = ankle.module["_code"]
+
+    def counted(f, p, u, q):
+        kind = "ARRAYS" if f is ankle.module["ARRAYS"] else "FLOATS"
+        counts[kind] += len(q[0]) if kind == "ARRAYS" else 1
+        return code(f, p, u, q)
+
+    ankle.module["_code"] = counted
+    turn = np.linspace(0, 2 * math.pi, 5000)
+    path = 0.2251 + 0.02 * np.sin(np.outer(turn, (1, 2)))
+    tau = np.ones_like(path)
+    found, reached = ankle.batch(path, tau)
+    assert reached == 5000
+    assert counts["ARRAYS"] < 1.2 * 5000
+    assert counts["FLOATS"] < 200
+    rng = np.random.default_rng(2)
+    jumps = 0.2251 + rng.uniform(-0.02, 0.02, (300, 2))
+    found, _ = ankle.batch(jumps, tau[:300])
+    wanted = ankle.one_by_one(jumps, tau[:300])
+    same(found, wanted)
+
+
+def test_what_has_nothing_to_solve_for_has_a_batch_too():
+    motors = Module(models.differential(), (["m_1", "m_2"], ["x_1", "x_2"]))
+    u = np.random.default_rng(3).normal(size=(200, 2))
+    (x, slopes, _, status), _ = motors.batch(u, np.ones((200, 2)))
+    assert not status.any()
+    first, second = u[:, 0] / 50, u[:, 1] / -60
+    by_hand = (first + second) / 4 + 0.1, (first - second) / 3 - 0.2
+    np.testing.assert_allclose(x.T, by_hand, rtol=0, atol=1e-14)
+    rows = [[1 / 200, -1 / 240], [1 / 150, 1 / 180]]
+    np.testing.assert_allclose(slopes, np.tile(rows, (200, 1, 1)), rtol=1e-14)
+
+
+def test_a_path_of_another_shape_is_refused():
+    ankle = Module(models.ankle(), (["left", "right"], ["pitch", "roll"]))
+    with pytest.raises(ValueError, match=r"u has the shape \(3,\), not \(B, 2\): left, right"):
+        ankle.batch(np.zeros(3), np.zeros(3))
+
+
+def test_a_path_never_changes_the_branch():
+    """T1b turns back at both sides: beyond is a status, and what follows is as before."""
+    lengths = [GOLDEN["T1b"]["parameters"][x] for x in "abcd"]
+    model = models.crank_rocker(*lengths, psi=0.99, motor=1.0)
+    four_bar = Module(model, (["motor"], ["phi_rocker"]))
+    ends = sorted(x["u"][0] for x in GOLDEN["T1b"]["singular"] if x["type"] == 2 and "u" in x)
+    u = (1.0 + 1.2 * np.sin(np.linspace(0, 6 * math.pi, 3000)))[:, np.newaxis]
+    (x, _, _, status), _ = four_bar.batch(u, np.ones_like(u))
+    beyond = (u[:, 0] < ends[0]) | (u[:, 0] > ends[1])
+    assert beyond.any()
+    assert (status[beyond] != 0).all()
+    a, b, c, d = lengths
+    crank, rocker = a * np.exp(1j * u[:, 0]), c * np.exp(1j * x[:, 0])
+    coupler = d + rocker - crank
+    known = status == 0
+    assert known.sum() > 0.9 * (~beyond).sum()
+    np.testing.assert_allclose(np.abs(coupler[known]), b, rtol=0, atol=1e-13)
+    side = (coupler * np.conj(rocker)).imag[known]
+    assert (np.sign(side) == np.sign(side[0])).all()
