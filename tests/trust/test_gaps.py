@@ -51,8 +51,8 @@ def test_a_gap_of_many_turns_is_followed_and_counted(form, quick_compiler):
 
 
 def test_a_gap_of_too_many_turns_ends_with_what_to_do_and_shows_progress(monkeypatch):
-    monkeypatch.setattr("kincompile.criteria.MAX_SUBSTEPS", 600)
     assert criteria.MAX_SUBSTEPS == 10_000
+    monkeypatch.setattr(criteria, "MAX_SUBSTEPS", 600)
     seen = []
     module = kc.compile(linkages.four_bar().mechanism)
     solution = kc.solve(module, [0, 1e6], progress=lambda *count: seen.append(count))
