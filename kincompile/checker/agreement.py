@@ -128,6 +128,12 @@ def finite(array: Array) -> Array:
     return np.asarray(np.where(np.isfinite(array), array, 0.0))
 
 
+def positive(scale: Array) -> Array:
+    """Return scales by row, (N, rows, 1), with the largest in the place of zeros, or 1."""
+    scale = np.where(scale > 0, scale, np.max(scale, axis=1, keepdims=True))
+    return np.where(scale > 0, scale, 1.0)
+
+
 def tolerance(given: Given, right: Right) -> Array:
     """Return the difference that is rounding, entry by entry; states are the first axis.
 

@@ -3,9 +3,10 @@
 generated   the formulas the compiler derives, evaluated at random states   reference.py, states.py
 written     the formulas of the author: texts, arrays, functions            written.py, hand_file.py
 match       rows, columns, signs, scales that conventions leave open        matching.py, layouts.py
-agree       entry by entry: equal, undecided, different                     agreement.py
-            each of them judged                                             comparer.py
-            M and Q, which are sums over masses and loads                   load_comparer.py
+agree       entry by entry: equal, undecided, different                     agreement.py, judged.py
+            of equations                                                    comparer.py
+            of M and Q, which are sums over masses and loads                load_comparer.py
+            of the maps of a transmission                                   transmission_*.py
 diagnose    the fault of the catalogue that gives the numbers that differ   diagnosis.py, *fault*.py
 report      entries with verdicts, for people and for machines              report.py
 
@@ -19,11 +20,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kincompile.checker.comparer import NUMBERS, Comparer
-from kincompile.checker.comparison import Verdict
+from kincompile.checker.comparer import Comparer
 from kincompile.checker.conventions import stated_conventions
-from kincompile.checker.given_forms import Forms
+from kincompile.checker.given_forms import Forms, Subject
 from kincompile.checker.hand_file import HandFile, read_hand_file
+from kincompile.checker.judged import retried
 from kincompile.checker.load_comparer import LoadComparer
 from kincompile.checker.reference import (
     COMPARED,
@@ -31,11 +32,8 @@ from kincompile.checker.reference import (
     OF_TRANSMISSIONS,
     QUANTITIES,
     Reference,
-    Subject,
 )
-from kincompile.checker.report import Report
-from kincompile.checker.states import given_states
-from kincompile.checker.transmission_compare import compare_maps, read_maps
+from kincompile.checker.transmission_comparer import TransmissionComparer
 from kincompile.checker.transmission_reference import Transmission, TransmissionReference
 from kincompile.checker.written import REPORTED, read_written, vocabulary
 from kincompile.errors import InputError
@@ -47,10 +45,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from kincompile.checker.report import Report
     from kincompile.checker.states import States
     from kincompile.checker.written import Written
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
+
+Readings = dict[str, list["Written"]]
+"""What is by hand, each quantity in the ways in which it may be meant."""
 
 
 def compare(
@@ -121,13 +123,9 @@ def compare(
     pairs = zip((*COMPARED, *OF_TRANSMISSIONS), values, strict=True)
     given = {name: value for name, value in pairs if value is not None}
     reference, stated = _reference(model), stated_conventions(conventions or {})
-    _require_own(reference, given, constraint)
-    if isinstance(reference, TransmissionReference):
-        readings = read_maps(reference, given, aliases or {}, at_states=states is not None)
-        return compare_maps(reference, readings, states, stated, strict=strict)
     forms = Forms(reference, stated, constraint)
-    written = _read(forms, given, aliases or {}, at_states=states is not None)
-    return _compared(forms, written, states, strict)
+    readings = _read(forms, given, aliases or {}, at_states=states is not None)
+    return _compared(forms, readings, states, strict)
 
 
 def _reference(model: Mechanism | ConstraintSystem | Reference | Transmission) -> Reference:
@@ -152,17 +150,6 @@ def _require_own(reference: Reference, given: Collection[str], constraint: str |
             "outputs); on the command line, with --transmission INPUTS:OUTPUTS"
         )
         raise InputError(f"{listed(wrong)}: {belongs}.")
-
-
-def _states(
-    reference: Reference, written: Mapping[str, Written], given: Mapping[str, ArrayLike] | None
-) -> States:
-    """Return where to compare: functions without parameters have the default ones."""
-    if given is not None:
-        return reference.normalised(given_states(given, reference.system))
-    if all(item.takes_parameters for item in written.values()):
-        return reference.random
-    return reference.random.with_default_parameters(reference.defaults)
 
 
 def compare_file(
@@ -199,38 +186,42 @@ def compare_file(
     reference = _reference(model)
     constraint = file.constraint if constraint is None else constraint
     try:
-        stated = stated_conventions(file.conventions)
-        _require_own(reference, file.quantities, constraint)
-        if isinstance(reference, TransmissionReference):
-            readings = read_maps(reference, file.quantities, file.aliases)
-            return compare_maps(reference, readings, None, stated, strict=strict)
-        if constraint is not None:
-            reference.block(constraint)
-        forms = Forms(reference, stated, constraint)
-        written = _read(forms, file.quantities, file.aliases)
+        forms = Forms(reference, stated_conventions(file.conventions), constraint)
+        readings = _read(forms, file.quantities, file.aliases)
     except InputError as error:
         raise InputError([f"{file.name}, {problem}" for problem in error.problems]) from error
-    return _compared(forms, written, None, strict)
+    return _compared(forms, readings, None, strict)
 
 
 def _compared(
-    forms: Forms,
-    written: Mapping[str, Written],
-    given: Mapping[str, ArrayLike] | None,
-    strict: bool,
+    forms: Forms, readings: Readings, given: Mapping[str, ArrayLike] | None, strict: bool
 ) -> Report:
-    """Compare in each form that fits, until one explains everything; the best is reported."""
+    """Compare equations, loads or a transmission."""
+    reference, stated = forms.reference, forms.stated
+    if isinstance(reference, TransmissionReference):
+        return retried(
+            lambda states, convention: TransmissionComparer(
+                reference, readings, states, stated, strict, convention
+            ),
+            _states(reference, readings, given),
+        ).report()
     of_equations, of_loads = (
-        {name: item for name, item in written.items() if name in names}
+        {name: item for name, (item,) in readings.items() if name in names}
         for names in (QUANTITIES, OF_LOADS)
     )
     reports = []
     if of_equations:
-        reports.append(_best(forms, of_equations, given, strict).report())
+        reports.append(_best(forms, of_equations, readings, given, strict).report())
     if of_loads:
-        states = _states(forms.reference, written, given)
-        subject = Subject(forms.reference, None, states)
-        reports.append(_of_loads(subject, of_loads, strict))
+        states = _states(reference, readings, given)
+        reports.append(
+            retried(
+                lambda states, convention: LoadComparer(
+                    reference, of_loads, states, strict, convention
+                ),
+                states,
+            ).report()
+        )
     report, *others = reports
     for added in others:
         conventions = tuple(dict.fromkeys((*report.conventions, *added.conventions)))
@@ -239,19 +230,30 @@ def _compared(
     return report
 
 
+def _states(
+    reference: Reference, readings: Readings, given: Mapping[str, ArrayLike] | None
+) -> States:
+    """Return where to compare: functions without parameters have the default ones."""
+    if given is not None:
+        return reference.given_states(given)
+    takes_parameters = all(item.takes_parameters for own in readings.values() for item in own)
+    return reference.random if takes_parameters else reference.fixed
+
+
 def _best(
     forms: Forms,
     written: Mapping[str, Written],
+    readings: Readings,
     given: Mapping[str, ArrayLike] | None,
     strict: bool,
 ) -> Comparer:
     """Return the comparison in the form that explains the most, the system's own first."""
     best: Comparer | None = None
-    for form in forms.fitting({name: item.shape for name, item in written.items()}):
-        subject = form.subject(_states(form.reference, written, given))
+    for reference, block in forms.fitting({name: item.shape for name, item in written.items()}):
+        subject = Subject(reference, block, _states(reference, readings, given))
         found = _in_one_form(subject, written, forms.stated.signs, strict)
         # Global axes in some constraints alone are a slip, and no way to write.
-        is_whole = not found.wrong_count or not form.reference.is_global
+        is_whole = not found.wrong_count or not reference.is_global
         if best is None or (is_whole and found.wrong_count < best.wrong_count):
             best = found
         if not best.wrong_count:
@@ -263,51 +265,42 @@ def _best(
 def _in_one_form(
     subject: Subject, written: Mapping[str, Written], signs: Mapping[str, float], strict: bool
 ) -> Comparer:
-    """Compare at the given states, and where something differs at others that may explain it."""
-    best = Comparer(subject, written, signs, strict)
-    for states, convention in best.other_states():
-        other = Comparer(replace(subject, states=states), written, signs, strict, convention)
-        if other.wrong_count < best.wrong_count:
-            best = other
-    return best
-
-
-def _of_loads(subject: Subject, written: Mapping[str, Written], strict: bool) -> Report:
-    """Compare M and Q; where numbers may stand for parameters, at their default values too."""
-    reference, states = subject.reference, subject.states
-    best, conventions = LoadComparer(reference, written, states, strict), []
-    if best.wrong_count and states is reference.random and reference.defaults.size:
-        fixed = states.with_default_parameters(reference.defaults)
-        other = LoadComparer(reference, written, fixed, strict)
-        if other.wrong_count < best.wrong_count:
-            best, conventions = other, [NUMBERS]
-    right = Verdict.CONVENTION if conventions else Verdict.EQUAL
-    entries = tuple(best.entries(right))
-    return Report(reference.system.name, None, entries, tuple(conventions))
+    return retried(
+        lambda states, convention: Comparer(
+            replace(subject, states=states), written, signs, strict, convention
+        ),
+        subject.states,
+    )
 
 
 def _read(
     forms: Forms,
     given: Mapping[str, object],
     aliases: Mapping[str, object],
+    *,
     at_states: bool = False,
-) -> dict[str, Written]:
+) -> Readings:
     """Read all quantities, or raise all problems at once."""
+    reference = forms.reference
+    _require_own(reference, given, forms.constraint)
     if any(name in OF_LOADS for name in given):
         _require_loads(forms)
-    words = vocabulary(forms.reference, aliases)
-    written: dict[str, Written] = {}
+    if forms.constraint is not None:
+        reference.block(forms.constraint)
+    own = reference if isinstance(reference, TransmissionReference) else forms
+    words = vocabulary(reference, aliases)
+    readings: Readings = {}
     problems: list[str] = []
     for name, value in given.items():
-        check = partial(forms.shape_problems, name)
+        check = partial(own.shape_problems, name)
         try:
-            written[name] = read_written(name, value, words, forms.reference, at_states, check)
-            problems += check(*written[name].shape)
+            readings[name] = read_written(name, value, words, reference, at_states, check)
+            problems += check(*readings[name][0].shape)
         except InputError as error:
             problems += [item for item in error.problems if item != REPORTED]
     if problems:
         raise InputError(problems)
-    return written
+    return readings
 
 
 def _require_loads(forms: Forms) -> None:

@@ -1,4 +1,4 @@
-"""One comparison: formulas matched, judged entry by entry, and what differs explained."""
+"""One comparison of equations: matched, judged entry by entry, and explained."""
 
 from __future__ import annotations
 
@@ -8,53 +8,31 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.checker.agreement import (
-    ABSOLUTE,
-    OF_ROW,
-    ON_MANIFOLD,
-    Given,
-    Right,
-    agrees,
-    is_undecided,
-    tolerance,
-)
-from kincompile.checker.comparison import (
-    ComparedEntry,
-    Convention,
-    Diagnosis,
-    Verdict,
-)
-from kincompile.checker.conventions import OPPOSITE, conventions_found
-from kincompile.checker.dependence import Dependence
-from kincompile.checker.diagnosis import Diagnostician, undecided_diagnosis
+from kincompile.checker.agreement import ABSOLUTE, OF_ROW, ON_MANIFOLD, Right, agrees, tolerance
+from kincompile.checker.comparison import Diagnosis, Verdict
+from kincompile.checker.conventions import OPPOSITE
+from kincompile.checker.diagnosis import Diagnostician
 from kincompile.checker.fault import Kind
 from kincompile.checker.forms import OTHER, is_same_space, known_forms
-from kincompile.checker.matching import Matcher, Matching, Units
-from kincompile.checker.report import Report
+from kincompile.checker.judged import UNEXPLAINED, Judged, Laid
+from kincompile.checker.matching import Matcher, Matching, Units, conventions_found
 from kincompile.model.expressions import symbol_names
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from kincompile.checker.joint_faults import Index
-    from kincompile.checker.reference import ConstraintBlock, Subject
-    from kincompile.checker.slips import Shown
+    from kincompile.checker.agreement import Given
+    from kincompile.checker.comparison import Convention
+    from kincompile.checker.fault import Index, Shown
+    from kincompile.checker.given_forms import Subject
+    from kincompile.checker.judged import Spot
+    from kincompile.checker.reference import ConstraintBlock
     from kincompile.checker.states import Array, States
     from kincompile.checker.written import Written
 
-UNEXPLAINED = "not in the catalogue"
 
-NUMBERS = Convention(
-    "numbers for parameters",
-    "numbers stand for parameters: everything is compared at the parameters' default values.",
-)
-
-Spot = tuple[str, int, int]
-"""A quantity, and row and column of one of its entries as written."""
-
-
-class Comparer:
-    """One comparison, from the matching to the report."""
+class Comparer(Judged):
+    """One comparison of equations, from the matching to the report."""
 
     def __init__(
         self,
@@ -64,32 +42,25 @@ class Comparer:
         strict: bool,
         convention: Convention | None = None,
     ) -> None:
+        super().__init__(subject.reference, subject.states, strict, convention)
         self._subject = subject
         self._quantities = written
-        self._strict = strict
-        self._convention = convention
-        self._reference = subject.reference
+        self._constraint = None if subject.block is None else subject.block.constraint.name
         self._matcher = Matcher(subject, written, signs)
-        self._adopt(self._matcher.match())
+        self._take(self._matcher.match())
         for block in subject.blocks:
             self._prefer_one_fault(block)
             self._prefer_known_form(block)
         self._find_equal_on_manifold()
 
-    @property
-    def wrong_count(self) -> int:
-        """The number of entries that are not accepted."""
-        return sum(not self._is_accepted(spot) for spot in self._verdicts)
-
     def other_states(self) -> Iterator[tuple[States, Convention | None]]:
         """Yield states at which the author may be right, each with the convention that it is."""
-        reference, states = self._reference, self._subject.states
-        if states is not reference.random or not self.wrong_count:
+        if self._states is not self._reference.random or not self.wrong_count:
             return
-        if not all(np.isfinite(given.values).all() for given in self._written.values()):
-            yield reference.about_guess(states), None
+        if not all(np.isfinite(laid.given.values).all() for laid in self._laid.values()):
+            yield self._reference.about_guess(self._states), None
         if any(map(self._lacks_a_parameter, self._wrong())):
-            yield states.with_default_parameters(reference.defaults), NUMBERS
+            yield from super().other_states()
 
     def _lacks_a_parameter(self, spot: Spot) -> bool:
         """Return whether parameters are missing in an entry, perhaps as numbers stand for them."""
@@ -97,48 +68,27 @@ class Comparer:
         written = self._quantities[name].formula(row, column)
         right = symbol_names(self._reference.expression(name, *self._index(spot)))
         missing = right - (symbol_names(written) if written is not None else set())
-        return any(item.name in missing for item in self._reference.system.parameters)
+        return not missing.isdisjoint(self._reference.own)
 
-    def _adopt(self, matching: Matching) -> None:
+    def _take(self, matching: Matching) -> None:
+        """Lay the formulas out as a matching has them, and judge them anew."""
         self._matching = matching
-        self._written = self._matcher.written(matching, self._subject.states)
-        self._expected = self._matcher.expected(matching, self._subject.states)
-        self._verdicts = {
-            spot: verdict for name in self._quantities for spot, verdict in self._judged(name)
-        }
-
-    def _judged(self, name: str) -> Iterator[tuple[Spot, Verdict]]:
-        given, right = self._written[name], self._expected[name]
-        equal = agrees(given, right)
-        exact = np.all(agrees(given.exact, right), axis=0)
-        undecided = np.all(equal | is_undecided(given, right), axis=0)
-        equal = np.all(equal, axis=0)
-        for row, columns in enumerate(equal):
-            is_plain = self._matching.is_plain(name, row) and self._convention is None
-            is_plain &= not self._reference.is_global or name != "Phi_q"
-            for column, is_equal in enumerate(columns):
-                if not np.isnan(right.values[:, row, column]).all():  # a column of the ground
-                    is_exact = is_plain and exact[row, column]
-                    verdict = Verdict.EQUAL if is_exact else Verdict.CONVENTION
-                    if not is_equal:
-                        is_open = undecided[row, column]
-                        verdict = Verdict.UNDECIDED if is_open else Verdict.DIFFERENT
-                    yield (name, row, column), verdict
+        written = self._matcher.written(matching, self._states)
+        expected = self._matcher.expected(matching, self._states)
+        reference, columns = self._reference, matching.layout.columns
+        rows = [reference.equations[row] for row in matching.rows]
+        coordinates = [None if k is None else reference.coordinates[k] for k in columns]
+        laid = {}
+        for name, item in self._quantities.items():
+            is_usual = self._convention is None
+            is_usual &= not reference.is_global or name != "Phi_q"
+            is_plain = [is_usual and matching.is_plain(name, k) for k in range(len(rows))]
+            names = coordinates if name == "Phi_q" else [None]
+            laid[name] = Laid(item, written[name], expected[name], rows, names, is_plain)
+        self._adopt(laid)
 
     def _conventions(self) -> Iterator[Convention]:
-        yield from [self._convention] if self._convention else []
-        yield from conventions_found(self._matching, self._reference)
-        for name, item in self._quantities.items():
-            rounded = {
-                self._reference.equations[self._index(spot)[0]]
-                for spot, verdict in self._verdicts.items()
-                if spot[0] == name and verdict is Verdict.CONVENTION
-                if self._matching.is_plain(name, spot[1]) and self._convention is None
-            }
-            if rounded:
-                yield Convention(
-                    "rounded numbers", f"{name}: {item.rounding}.", tuple(sorted(rounded))
-                )
+        return conventions_found(self._matching, self._reference)
 
     def _wrong(self, block: ConstraintBlock | None = None) -> list[Spot]:
         wrong = [spot for spot, verdict in self._verdicts.items() if not verdict.is_right]
@@ -170,10 +120,10 @@ class Comparer:
             factors = before.factors.copy()
             factors[list(rows)] = 1.0
             if is_guess or np.any(factors != before.factors):
-                self._adopt(replace(before, factors=factors, forms=forms))
+                self._take(replace(before, factors=factors, forms=forms))
                 if self._is_one_fault(block):
                     return
-                self._adopt(before)
+                self._take(before)
 
     def _prefer_known_form(self, block: ConstraintBlock) -> None:
         """Take a known form in which a constraint has fewer slips, if it has not one as it is."""
@@ -183,10 +133,10 @@ class Comparer:
             return
         best = before
         for form in known_forms(block, self._subject):
-            self._adopt(self._matcher.with_form(before, form))
+            self._take(self._matcher.with_form(before, form))
             if (count := len(self._wrong(block))) < fewest:
                 best, fewest = self._matching, count
-        self._adopt(best)
+        self._take(best)
 
     def _is_one_fault(self, block: ConstraintBlock) -> bool:
         spots = [spot for spot in self._wrong(block) if spot[0] == "Phi_q"]
@@ -204,21 +154,9 @@ class Comparer:
             scale = self._matching.factors[row] * self._matching.sign(name)
             if name == "Phi_q":
                 scale = scale * units[place[1]]
-            given = self._written[name][:, row, column]
-            right = self._expected[name][:, row, column]
-            values[place] = given.values / scale, tolerance(given, right) / np.abs(scale)
+            given, lost = self._laid[name].shown([(row, column)])[row, column]
+            values[place] = given / scale, lost / np.abs(scale)
         return values
-
-    def report(self) -> Report:
-        """Return the outcome."""
-        diagnoses = self._diagnoses()
-        block = self._subject.block
-        return Report(
-            self._reference.system.name,
-            None if block is None else block.constraint.name,
-            tuple(self._entry(spot, diagnoses.get(spot, ())) for spot in self._verdicts),
-            tuple(self._conventions()),
-        )
 
     def _find_equal_on_manifold(self) -> None:
         """Compare the entries that differ once more, at states at which the constraint holds.
@@ -241,7 +179,7 @@ class Comparer:
         for name, row, column in spots:
             given, right = written[name][:, row, column], expected[name][:, row, column]
             # A value that vanishes on the manifold is measured by its size elsewhere.
-            size = np.max(np.abs(self._expected[name].values[:, row, column]))
+            size = np.max(np.abs(self._laid[name].right.values[:, row, column]))
             size += np.max(right.scale)
             allowed = ON_MANIFOLD * size + np.max(tolerance(given, right))
             if np.isfinite(allowed) and np.all(np.abs(given.values - right.values) <= allowed):
@@ -254,8 +192,8 @@ class Comparer:
         """
         name, row, column = spot
         place = np.s_[:, row : row + 1, column : column + 1]
-        opposite = self._expected[name][place].times(-1.0)
-        is_opposite = agrees(self._written[name][place], opposite).all()
+        opposite = self._laid[name].right[place].times(-1.0)
+        is_opposite = agrees(self._laid[name].given[place], opposite).all()
         return name == "Phi" or bool(is_opposite) or self._has_rates(spot)
 
     def _has_rates(self, spot: Spot) -> bool:
@@ -263,12 +201,6 @@ class Comparer:
         expression = self._quantities[name].formula(row, column)
         names = symbol_names(expression) if expression is not None else set()
         return name != "gamma" and not names.isdisjoint(self._reference.rates)
-
-    def _is_accepted(self, spot: Spot) -> bool:
-        verdict = self._verdicts[spot]
-        if self._strict:
-            return verdict is Verdict.EQUAL
-        return verdict.is_right or (verdict is Verdict.MANIFOLD and spot[0] in ("nu", "gamma"))
 
     def _diagnoses(self) -> dict[Spot, tuple[Diagnosis, ...]]:
         found: dict[Spot, tuple[Diagnosis, ...]] = {}
@@ -280,12 +212,7 @@ class Comparer:
                 if whole is not None:
                     found |= dict.fromkeys(spots, (whole,))
                     continue
-                is_open = [self._verdicts[spot] is Verdict.UNDECIDED for spot in spots]
-                undecided = [spot for spot, is_so in zip(spots, is_open, strict=True) if is_so]
-                spots = [spot for spot, is_so in zip(spots, is_open, strict=True) if not is_so]
-                for spot in undecided:
-                    _, row, column = spot
-                    found[spot] = (undecided_diagnosis(self._written[name][:, row, column]),)
+                spots = [x for x in spots if self._verdicts[x] is not Verdict.UNDECIDED]
                 explained = self._diagnostician.explain(
                     block, name, self._in_system_terms(spots), self._matching.form(block.rows[0])
                 )
@@ -298,15 +225,15 @@ class Comparer:
         """The diagnoses of quantities that are wrong as a whole: sign, place of the rows."""
         return {
             name: found
-            for name, written in self._written.items()
-            if (found := self._whole_fault(name, written, self._expected[name]))
+            for name, laid in self._laid.items()
+            if (found := self._whole_fault(name, laid.given, laid.right))
         }
 
     def _whole_fault(self, name: str, written: Given, expected: Right) -> Diagnosis | None:
         """Return the one fault that explains a quantity of all constraints."""
         right = expected.values
         if name == "Phi_q":
-            plain = self._reference.values(self._subject.states)[name]
+            plain = self._reference.values(self._states)[name]
             turned = np.swapaxes(plain, -1, -2)
             is_square = written.values.shape == turned.shape
             if is_square and agrees(written, replace(expected, values=turned)).all():
@@ -339,16 +266,16 @@ class Comparer:
         is_wrong = any(self._verdicts[spot] is Verdict.DIFFERENT for spot in wrong)
         if name == "Phi" or not is_wrong or self._is_one_fault(block):
             return None
-        states = self._subject.states
+        states = self._states
         if (combination := self._combination(block, states)) is not None:
             if name == "Phi_q":
                 return _same_space("", "your Phi" if "Phi" in self._quantities else "any Phi")
             rows = [k for k, row in enumerate(self._matching.rows) if row in block.rows]
             generated = self._reference.values(states).of(name)
-            given = self._written[name][:, rows]
+            given = self._laid[name].given[:, rows]
             right = generated[:, [self._matching.rows[k] for k in rows]]
             sizes = np.abs(combination) @ np.abs(right)
-            scale = np.maximum(self._expected[name].scale[:, rows], sizes)
+            scale = np.maximum(self._laid[name].right.scale[:, rows], sizes)
             if agrees(given, Right(combination @ right, scale, OF_ROW * scale)).all():
                 text = "it belongs to the rows of your Phi_q, combinations of the right ones."
                 return Diagnosis(Kind.SAME_SPACE, text)
@@ -384,21 +311,12 @@ class Comparer:
         if self._verdicts[spot] is Verdict.MANIFOLD:
             text = "right only where the constraints hold; Newton's method needs it elsewhere too."
             return Diagnosis(UNEXPLAINED, text)
-        if self._quantities[spot[0]].takes_states:
-            return Diagnosis(UNEXPLAINED, self._dependence.explanation(*spot))
-        return Diagnosis(UNEXPLAINED, "no fault of the catalogue fits.")
+        return super()._unexplained(spot)
 
-    @cached_property
-    def _dependence(self) -> Dependence:
-        def evaluate(states: States) -> tuple[dict[str, Array], dict[str, Array]]:
-            written = self._matcher.written(self._matching, states)
-            expected = self._matcher.expected(self._matching, states)
-            hand, right = (
-                {name: item.values for name, item in found.items()} for found in (written, expected)
-            )
-            return hand, right
-
-        return Dependence(self._reference, self._subject.states, evaluate)
+    def _values_at(self, states: States) -> dict[str, tuple[Array, Array]]:
+        written = self._matcher.written(self._matching, states)
+        expected = self._matcher.expected(self._matching, states)
+        return {name: (item.values, expected[name].values) for name, item in written.items()}
 
     @cached_property
     def _diagnostician(self) -> Diagnostician:
@@ -406,26 +324,12 @@ class Comparer:
         subject = self._subject
         return subject.kept("faults", lambda: Diagnostician(subject.reference, subject.states))
 
-    def _entry(self, spot: Spot, diagnoses: tuple[Diagnosis, ...]) -> ComparedEntry:
-        name, row, column = spot
-        system_row, system_column = self._index(spot)
-        values = (item[name].values[:, row, column] for item in (self._written, self._expected))
-        is_accepted = self._is_accepted(spot)
-        reference, form_row = self._reference, system_row
-        form = self._matching.form(system_row)
-        if form is not None and form.formulas is not None and not is_accepted:
-            reference, form_row = form.formulas, form.rows.index(system_row)
-        return ComparedEntry(
-            name,
-            self._reference.equations[system_row],
-            self._reference.coordinates[system_column] if name == "Phi_q" else None,
-            reference.later(name, form_row, system_column),
-            self._quantities[name].texts[row][column],
-            self._verdicts[spot],
-            is_accepted,
-            diagnoses,
-            None if is_accepted else self._reference.difference(self._subject.states, *values),
-        )
+    def _later(self, spot: Spot) -> Callable[[], str]:
+        row, column = self._index(spot)
+        form = self._matching.form(row)
+        if form is None or form.formulas is None or self._is_accepted(spot):
+            return self._reference.later(spot[0], row, column)
+        return form.formulas.later(spot[0], form.rows.index(row), column)
 
 
 def _same_space(where: str, Phi: str) -> Diagnosis:

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.checker.agreement import finite
+from kincompile.checker.reference import MOVING
 from kincompile.checker.states import Array, States
 from kincompile.names import listed, rate
 
 if TYPE_CHECKING:
     from kincompile.checker.reference import Reference
 
-Evaluate = Callable[[States], tuple[Mapping[str, Array], Mapping[str, Array]]]
+Evaluate = Callable[[States], Mapping[str, tuple[Array, Array]]]
 """Gives the written and the right values by quantity, (N, rows, columns) each."""
 
 CHANGE = 1.17  # any factor will do that is no symmetry of a formula
@@ -40,7 +41,8 @@ class Dependence:
         self._growth = {name: _ratio(faster[name], base[2][name]) for name in faster}
 
     def _with_difference(self, states: States) -> list[Mapping[str, Array]]:
-        written, right = self._evaluate(states)
+        pairs = self._evaluate(states)
+        written, right = ({name: item[k] for name, item in pairs.items()} for k in range(2))
         return [written, right, {name: written[name] - right[name] for name in written}]
 
     def explanation(self, quantity: str, row: int, column: int) -> str:
@@ -57,7 +59,7 @@ class Dependence:
         depends = f"depends on {listed(sorted(difference))}"
         parts.append(f"the difference {depends if difference else 'is a constant number'}")
         order = _ORDERS.get(round(float(self._growth[quantity][row, column]), 6))
-        if quantity == "gamma" and order:
+        if quantity in MOVING and order:
             parts.append(f"it is {order} in the velocities")
         return f"{'; '.join(parts)}."
 

@@ -9,27 +9,28 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile.checker.agreement import ABSOLUTE, ROUNDING, Given, finite, is_close
 from kincompile.checker.comparison import Diagnosis
 from kincompile.checker.entry_faults import TypedEntry
-from kincompile.checker.fault import OMISSIONS, TERM_SIGN, Fault, Kind
+from kincompile.checker.fault import OMISSIONS, TERM_SIGN, Fault, Kind, showing
 from kincompile.checker.forms import known_forms
-from kincompile.checker.joint_faults import PARTS_OF_GAMMA, Index, JointFaults, NumericFault
+from kincompile.checker.gamma_faults import PARTS_OF_GAMMA
+from kincompile.checker.given_forms import Subject
+from kincompile.checker.joint_faults import JointFaults
 from kincompile.checker.misread import Misread
-from kincompile.checker.reference import Subject
 from kincompile.derive.equations import derive_equation
 from kincompile.model.resolve import FreeEquation, Joint
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+    from kincompile.checker.fault import Index, NumericFault, Shown
     from kincompile.checker.forms import Form
     from kincompile.checker.reference import ConstraintBlock, Reference
-    from kincompile.checker.slips import Shown
     from kincompile.checker.states import Array, States
 
 ROUNDED = 3e-3
@@ -47,28 +48,6 @@ _NOT_DEFINED = Diagnosis(
     "it has no finite value at some states where the right one has: it divides by zero, or "
     "takes a root or logarithm of a negative number",
 )
-
-
-class OneEntry(Protocol):
-    """What may be wrong in one entry, from its numbers."""
-
-    def one(self, given: Shown) -> Iterable[Fault[Array]]:
-        """Return the slips that give an author's numbers."""
-
-    def two(self, given: Shown) -> Iterable[Fault[Array]]:
-        """Return two slips that together give an author's numbers."""
-
-
-class Entry(Protocol):
-    """One entry as it is typed."""
-
-    @property
-    def faults(self) -> Sequence[Fault[Array]]:
-        """The usual faults, with the entry's values."""
-
-    @property
-    def slips(self) -> OneEntry:
-        """All other slips."""
 
 
 def undecided_diagnosis(given: Given) -> Diagnosis:
@@ -203,25 +182,18 @@ class Diagnostician:
         self, block: ConstraintBlock, quantity: str, form: Form | None
     ) -> Iterator[NumericFault]:
         """Yield the formulas that are right for another Phi than the author's."""
-        rows, right = list(block.rows), self._right(quantity, form)
-        others = []
+        if quantity == "Phi":
+            return
+        right, others = self._right(quantity, form), []
         if form is not None and form.defines:
-            others.append(("another form of the equation", self._right(quantity, None)[:, rows]))
+            others.append(("another form of the equation", self._right(quantity, None)))
         if form is None:
             subject = Subject(self._reference, block, self._states)
-            others += [
-                (item.text, item.evaluate(self._states)[quantity])
-                for item in known_forms(block, subject)
-            ]
+            others += [(x.text, self._right(quantity, x)) for x in known_forms(block, subject)]
+        places = [(row, column) for row in block.rows for column in range(right.shape[-1])]
         for text, values in others:
-            result = {
-                (row, column): values[:, k, column]
-                for k, row in enumerate(rows)
-                for column in range(values.shape[-1])
-                if not is_close(values[:, k, column], right[:, row, column])
-            }
-            if result and quantity != "Phi":
-                yield Fault(Kind.OTHER_FORM, f"it belongs to {text}, and not to your Phi", result)
+            text = f"it belongs to {text}, and not to your Phi"
+            yield from showing(Kind.OTHER_FORM, text, values, right, places)
 
     def _right(self, quantity: str, form: Form | None, states: States | None = None) -> Array:
         """Return the right formulas; at other states than those of the comparison if given."""
@@ -276,7 +248,7 @@ def looked_up(
     right: Array,
     catalogue: Sequence[NumericFault],
     several: Sequence[NumericFault],
-    entry_of: Callable[[Index], Entry],
+    entry_of: Callable[[Index], TypedEntry | None],
     vectors: Callable[[], Iterable[NumericFault]],
 ) -> dict[Index, tuple[Diagnosis, ...]]:
     """Return the explanations of entries that differ, none where the catalogue has none.
@@ -290,7 +262,7 @@ def looked_up(
     catalogue, several
         Faults of a whole formula, and those that show in several entries.
     entry_of
-        Gives an entry as it is typed.
+        Gives an entry as it is typed, None where only its numbers are known.
     vectors
         Gives the vectors that fit entries which nothing else explains.
     """
@@ -298,17 +270,19 @@ def looked_up(
     for faults in (catalogue, several):
         found |= _explained(left, [fault for fault in faults if len(fault.result) > 1])
     # One entry alone is looked at as it is typed first, in sines and cosines.
+    made = {place: entry_of(place) for place in left}
+    entries = {place: entry for place, entry in made.items() if entry is not None}
     typed: list[NumericFault] = [
         Fault(fault.kind, fault.text, {place: fault.result}, fault.detail)
-        for place in left
-        for fault in entry_of(place).faults
+        for place, entry in entries.items()
+        for fault in entry.usual(left[place])
     ]
     catalogue = [*typed, *catalogue]
     found |= _explained(left, catalogue)
     for place, given in left.items():
         found[place] = (
             _one_entry(place, given, right[:, place[0], place[1]], catalogue)
-            or _named(entry_of(place).slips.one(given))
+            or _named(entries[place].one(given) if place in entries else ())
             or _named(_at(place, given, several))
         )
     # What is left is no slip of one entry: another vector, or two slips at once.
@@ -318,8 +292,8 @@ def looked_up(
             place: found[place] or _named(fault for fault in others if place in fault.result)
             for place in left
         }
-    for place, given in left.items():
-        found[place] = found[place] or _named(entry_of(place).slips.two(given))
+    for place in left.keys() & entries.keys():
+        found[place] = found[place] or _named(entries[place].two(left[place]))
     return found
 
 

@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy
 
-from kincompile.checker.agreement import is_alike
+from kincompile.checker.agreement import is_alike, is_close
 from kincompile.checker.fault import A_TERM, Fault, Kind, term_faults, whole_faults
-from kincompile.checker.slips import Slips
+from kincompile.checker.slips import Slips, partner
 from kincompile.names import rate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from kincompile.checker.fault import Shown
     from kincompile.checker.reference import Reference
     from kincompile.checker.states import Array, States
 
@@ -37,7 +38,9 @@ class TypedEntry:
     Parameters
     ----------
     derived
-        The right entry; the author's where `is_by_hand`, whose faults give what is right.
+        The right entry; the author's where `right` is given.
+    right
+        The right values of an entry by hand, whose faults are those that give these.
 
     Attributes
     ----------
@@ -51,17 +54,16 @@ class TypedEntry:
         quantity: str,
         derived: sympy.Expr,
         states: States,
-        *,
-        is_by_hand: bool = False,
+        right: Shown | None = None,
     ) -> None:
         self._reference, self._quantity, self._states = reference, quantity, states
         self._derived = self.entry = derived
-        self._is_by_hand = is_by_hand
+        self._right, self._is_by_hand = right, right is not None
         if _count(self._derived) <= MOST_EXPANDED:
             self.entry = _multiplied_out(self._derived)
 
     @cached_property
-    def slips(self) -> Slips:
+    def _slips(self) -> Slips:
         """What may stand in the place of its products, besides the usual faults."""
         is_short = len(sympy.Add.make_args(self.entry)) <= MOST_TERMS
         forms = dict.fromkeys((self._derived, self.entry) if is_short else (self._derived,))
@@ -69,10 +71,21 @@ class TypedEntry:
             self._reference, list(forms), self._quantity, self._states, is_by_hand=self._is_by_hand
         )
 
-    @property
-    def faults(self) -> list[Fault[Array]]:
-        """The usual faults, with the entry's values."""
-        return [Fault(x.kind, x.text, values, x.detail) for x, _, values in self._found]
+    def one(self, given: Shown) -> Iterator[Fault[Array]]:
+        """Yield the slips that give an author's numbers, or make them right, but the usual ones."""
+        return self._slips.one(given if self._right is None else self._right)
+
+    def two(self, given: Shown) -> Iterator[Fault[Array]]:
+        """Yield two slips that do together."""
+        return self._slips.two(given if self._right is None else self._right)
+
+    def usual(self, given: Shown) -> Iterator[Fault[Array]]:
+        """Yield the usual faults, with the entry's values; by hand those that an author made."""
+        for fault, _, values in self._found:
+            if self._right is None:
+                yield Fault(fault.kind, fault.text, values, fault.detail)
+            elif is_close(values, *self._right):
+                yield Fault(fault.kind, fault.text, given[0], fault.detail)
 
     def formulas(self) -> Iterator[Fault[sympy.Expr]]:
         """Yield the usual faults, each with the entry as it is then typed."""
@@ -89,7 +102,7 @@ class TypedEntry:
         if not self._is_by_hand:  # else its multiples are slips
             faults += whole_faults(self._quantity, "the entry", lambda x: x * entry, printed)
         text = "sine and cosine are swapped throughout"
-        faults.append(Fault(Kind.SINE_COSINE, text, _sine_cosine(entry), printed))
+        faults.append(Fault(Kind.SINE_COSINE, text, partner(entry), printed))
         terms = sympy.Add.make_args(entry)
         parts = [entry, *terms] if len(terms) <= MOST_TERMS else [entry]
         replaced = [0] * len(faults)  # number of the part in whose place the result stands
@@ -145,10 +158,10 @@ def _faults_of_term(
     if not is_by_hand:
         yield from term_faults(A_TERM, lambda factor: factor * term, full)
     functions = sorted(term.atoms(sympy.sin, sympy.cos), key=str)
-    yield Fault(Kind.SINE_COSINE, "sine and cosine are swapped in a term", _sine_cosine(term), full)
+    yield Fault(Kind.SINE_COSINE, "sine and cosine are swapped in a term", partner(term), full)
     for function in functions if len(functions) > 1 else ():
         text = f"sine and cosine of {function.args[0]} are swapped in a term"
-        swapped = term.xreplace({function: _sine_cosine(function)})
+        swapped = term.xreplace({function: partner(function)})
         yield Fault(Kind.SINE_COSINE, text, swapped, full)
         if function.func == sympy.cos and function.args[0].is_Add:
             # cos(a - b) is also cos(b - a), whose sine is the other one.
@@ -162,13 +175,6 @@ def _faults_of_term(
                 yield Fault(Kind.MIXED_ANGLES, text, term.xreplace(mixed), full)
     if not is_by_hand:
         yield from _missing_factors(term, full)
-
-
-def _sine_cosine(expression: sympy.Expr) -> sympy.Expr:
-    other = {sympy.sin: sympy.cos, sympy.cos: sympy.sin}
-    found = expression.atoms(sympy.sin, sympy.cos)
-    swapped: sympy.Expr = expression.xreplace({f: other[f.func](*f.args) for f in found})
-    return swapped
 
 
 def _missing_factors(term: sympy.Expr, full: str) -> Iterator[Fault[sympy.Expr]]:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from math import pi
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+import numpy as np
+
+from kincompile.checker.agreement import are_close
+
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
+
+    from kincompile.checker.states import Array
 
 
 class Kind:
@@ -59,7 +66,6 @@ class Kind:
     INVERSE = "inverse for the matrix"
     FRAME = "wrong frame"
     CHAIN_RULE = "a term of the chain rule missing"
-    ENERGY = "energy not conserved"
     BRANCH = "another assembly"
     COLUMNS = "columns exchanged"
     ARM = "moment arm from another point"
@@ -91,6 +97,32 @@ class Fault(Generic[Result]):
     text: str
     result: Result  # the faulty formula, formulas by part, or numbers by entry
     detail: str = ""  # the right formula of the faulty term or entry, for those who may see it
+
+
+Index = tuple[int, int]
+"""Row and column of an entry; the column of a vector is 0."""
+
+Shown = tuple["Array", "Array"]
+"""Values of an entry and what rounding may have taken from them, (N,) each."""
+
+NumericFault = Fault[Mapping[Index, "Array"]]
+"""A fault with the numbers that stand in the entries where it shows, shape (N,) each."""
+
+
+def showing(
+    kind: str, text: str, other: Array, right: Array, places: Iterable[Index] | None = None
+) -> Iterator[NumericFault]:
+    """Yield a fault with the entries that it changes, of all or of some, if it changes any.
+
+    Parameters
+    ----------
+    other, right
+        The values with the fault and the right ones, (N, rows, columns).
+    """
+    changed = ~are_close(other, right)
+    chosen = np.argwhere(changed).tolist() if places is None else places
+    if result := {(i, j): other[:, i, j] for i, j in chosen if changed[i, j]}:
+        yield Fault(kind, text, result)
 
 
 def whole_faults(

@@ -17,11 +17,11 @@ import numpy as np
 import sympy
 
 from kincompile.calculus.expand import Expansion
-from kincompile.calculus.expressions import Expression, Rotated, dot
+from kincompile.calculus.expressions import Expression, Rotated, Vector, dot
 from kincompile.calculus.space import EulerRotation
 from kincompile.checker.agreement import ON_MANIFOLD
 from kincompile.checker.formula_faults import everywhere
-from kincompile.checker.reference import QUANTITIES, ConstraintBlock, Reference, Subject
+from kincompile.checker.reference import QUANTITIES, ConstraintBlock, Reference
 from kincompile.checker.states import Array, States
 from kincompile.checker.vectors import joint_values, with_roles_exchanged
 from kincompile.errors import KincompileError
@@ -32,6 +32,7 @@ from kincompile.model.symbolic import SymbolicEnvironment
 from kincompile.model.system import ConstraintSystem
 
 if TYPE_CHECKING:
+    from kincompile.checker.given_forms import Subject
     from kincompile.checker.written import Written
 
 ACCURACY = 1e-6
@@ -222,21 +223,16 @@ def jacobian_form(subject: Subject, rows: Sequence[int], Phi_q: Function) -> For
     Its nu and gamma are known where the equations hold: the same combinations of the generated ones
     as the rows. Elsewhere the combination that comes nearest stands for them.
     """
-    states, reference = subject.near(rows), subject.reference
-    if states is None:
-        return None
-    with np.errstate(all="ignore"):
-        generated = reference.values(states)["Phi_q"][:, list(rows)]
-        if not is_same_space(Phi_q(states), generated) or not _is_gradient(Phi_q, subject):
-            return None
 
     def evaluate(states: States) -> Mapping[str, Array]:
-        own, values = Phi_q(states), reference.values(states)
+        own, values = Phi_q(states), subject.reference.values(states)
         generated = {name: values.of(name)[:, list(rows)] for name in QUANTITIES}
         factor = own @ np.linalg.pinv(generated["Phi_q"], rcond=1e-10)
         return {**{name: factor @ item for name, item in generated.items()}, "Phi_q": own}
 
-    return _named(Form(EQUIVALENT, OTHER, tuple(rows), evaluate, defines=True), subject)
+    form = Form(EQUIVALENT, OTHER, tuple(rows), evaluate, defines=True)
+    is_one = _is_equivalent(form, subject) and _is_gradient(Phi_q, subject)
+    return _named(form, subject) if is_one else None
 
 
 def _is_gradient(Phi_q: Function, subject: Subject) -> bool:
@@ -273,8 +269,8 @@ def _other_extensions(block: ConstraintBlock, subject: Subject) -> Iterator[Form
         return
     if not isinstance(joint, Joint) or joint.template.dimension == 2:
         return
-    for text, change in EXTENSIONS.items():
-        Phi = tuple(everywhere(item, change) for item in joint.template.Phi)
+    for text, write in EXTENSIONS.items():
+        Phi = tuple(everywhere(item, partial(_extended, write)) for item in joint.template.Phi)
         other = replace(joint, template=replace(joint.template, Phi=Phi))
         if Phi != joint.template.Phi:
             # Its faults are those of its entries: derivatives of (1 - p^T p) v have no name.
@@ -289,36 +285,24 @@ def _written(joint: Joint, reference: Reference) -> Reference | None:
     return _formulas(reference, Phi)
 
 
-def _with_norm(node: Expression) -> Expression | None:
-    """Return A v + (p^T p - 1) v for A v."""
+def _extended(write: Callable[..., Vector], node: Expression) -> Expression | None:
+    """Return a turned vector by another rotation matrix, None of other nodes."""
     match node:
         case Rotated(EulerRotation(p), vector, ()):
-            return node + (dot(p, p) - 1) * vector
+            return write(node, vector, dot(p, p))
     return None
 
 
-def _without_norm(node: Expression) -> Expression | None:
-    """Return A v + (1 - p^T p) v for A v."""
-    match node:
-        case Rotated(EulerRotation(p), vector, ()):
-            return node + (1 - dot(p, p)) * vector
-    return None
-
-
-def _normalised(node: Expression) -> Expression | None:
-    """Return A v/(p^T p) for A v."""
-    match node:
-        case Rotated(EulerRotation(p), _, ()):
-            return dot(p, p) ** -1 * node
-    return None
-
-
-EXTENSIONS: Mapping[str, Callable[[Expression], Expression | None]] = {
-    "A = (2 e0^2 - 1) I + 2 (e e^T + e0 e~) instead of E G^T": _with_norm,
-    "A = (1 - 2 e^T e) I + 2 (e e^T + e0 e~) instead of E G^T": _without_norm,
-    "A = E G^T/(p^T p) instead of E G^T": _normalised,
+EXTENSIONS: Mapping[str, Callable[..., Vector]] = {
+    "A = (2 e0^2 - 1) I + 2 (e e^T + e0 e~) instead of E G^T": (
+        lambda turned, vector, square: turned + (square - 1) * vector
+    ),
+    "A = (1 - 2 e^T e) I + 2 (e e^T + e0 e~) instead of E G^T": (
+        lambda turned, vector, square: turned + (1 - square) * vector
+    ),
+    "A = E G^T/(p^T p) instead of E G^T": lambda turned, vector, square: square**-1 * turned,
 }
-"""What is written, and what stands for a turned vector."""
+"""What is written, and what stands for A v, by A v, v and p^T p."""
 
 
 def _is_distance(block: ConstraintBlock) -> bool:

@@ -251,54 +251,49 @@ def everywhere(
     return rebuilt if changed is None else changed
 
 
-def _children(node: ex.Expression) -> Iterator[tuple[Any, Callable[[Any], ex.Expression]]]:
-    """Yield the parts of a node, each with the function that puts another in its place.
+_PARTS: Mapping[type, tuple[str, ...]] = {
+    ex.Sum: ("terms",),
+    ex.VectorSum: ("terms",),
+    ex.Product: ("factors",),
+    ex.Power: ("base",),
+    ex.Dot: ("left", "right"),
+    ex.Scaled: ("factor", "vector"),
+    ex.Rotated: ("vector",),
+    ex.Perpendicular: ("vector",),
+    ex.RotationSlope: ("vector",),
+    ex.Cross: ("left", "right"),
+    ex.TimesG: ("vector",),
+    ex.RowOfSlope: ("left", "slope"),
+}
+"""The parts of a node that faults are looked for in.
 
-    Angles other than a body's own, and lengths of constant vectors, are taken as given.
-    """
-    match node:
-        case ex.Sum(terms):
-            yield from _sequence(terms, ex.Sum)
-        case ex.VectorSum(terms):
-            yield from _sequence(terms, ex.VectorSum)
-        case ex.Product(factors):
-            yield from _sequence(factors, _product)
-        case ex.Power(base, exponent):
-            yield base, lambda new: ex.Power(new, exponent)
-        case ex.Dot(left, right):
-            yield left, lambda new: ex.Dot(new, right)
-            yield right, lambda new: ex.Dot(left, new)
-        case ex.Scaled(factor, vector):
-            yield factor, lambda new: ex.Scaled(new, vector)
-            yield vector, lambda new: ex.Scaled(factor, new)
-        case ex.Rotated(rotation, vector, along):
-            yield vector, lambda new: ex.Rotated(rotation, new, along)
-        case ex.Perpendicular(vector):
-            yield vector, ex.Perpendicular
-        case ex.RotationSlope(rotation, vector, is_small):
-            yield vector, lambda new: ex.RotationSlope(rotation, new, is_small)
-        case ex.Cross(left, right):
-            yield left, lambda new: ex.Cross(new, right)
-            yield right, lambda new: ex.Cross(left, new)
-        case ex.TimesG(p, vector, is_transposed):
-            yield vector, lambda new: ex.TimesG(p, new, is_transposed)
-        case ex.RowOfSlope(left, slope):
-            yield left, lambda new: ex.RowOfSlope(new, slope)
-            yield slope, lambda new: _row_of(left, new)
+Angles other than a body's own, and lengths of constant vectors, are taken as given.
+"""
 
 
-def _row_of(left: ex.Vector, slope: ex.Vector) -> ex.Expression:
-    """Return left^T slope, a number of the slope in front."""
-    factor, inner = ex.split_factor(slope)
-    assert isinstance(inner, ex.RotationSlope)
-    return ex.scaled(factor, ex.RowOfSlope(left, inner))
+def _children(node: Any) -> Iterator[tuple[Any, Callable[[Any], ex.Expression]]]:
+    """Yield the parts of a node, each with the function that puts another in its place."""
+    for name in _PARTS.get(type(node), ()):
+        part = getattr(node, name)
+        if not isinstance(part, tuple):
+            yield part, partial(_with, node, name)
+            continue
+        for k, item in enumerate(part):
+            yield item, partial(_with_item, node, name, k)
 
 
-def _sequence(
-    parts: tuple[Any, ...], build: Callable[[Any], ex.Expression]
-) -> Iterator[tuple[Any, Callable[[Any], ex.Expression]]]:
-    def replacing(k: int) -> Callable[[Any], ex.Expression]:
-        return lambda new: build((*parts[:k], new, *parts[k + 1 :]))
+def _with_item(node: Any, name: str, k: int, new: Any) -> ex.Expression:
+    items = getattr(node, name)
+    return _with(node, name, (*items[:k], new, *items[k + 1 :]))
 
-    for k, part in enumerate(parts):
-        yield part, replacing(k)
+
+def _with(node: Any, name: str, new: Any) -> ex.Expression:
+    """Return a node with another part; numbers alone are multiplied, one of a slope is in front."""
+    if isinstance(node, ex.Product):
+        return _product(new)
+    if name != "slope":
+        changed: ex.Expression = replace(node, **{name: new})
+        return changed
+    factor, slope = ex.split_factor(new)
+    assert isinstance(slope, ex.RotationSlope)
+    return ex.scaled(factor, ex.RowOfSlope(node.left, slope))

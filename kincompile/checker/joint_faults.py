@@ -22,13 +22,7 @@ from kincompile.calculus.rotations import PlaneRotation
 from kincompile.calculus.space import EulerRotation, TurnedFrame
 from kincompile.calculus.symbols import PlaneFrame
 from kincompile.checker.agreement import ABSOLUTE, CLOSE, is_alike
-from kincompile.checker.collected import (
-    CollectedTerm,
-    collected,
-    perfect_square,
-    times_product,
-)
-from kincompile.checker.fault import Fault, Kind, term_faults, whole_faults
+from kincompile.checker.fault import Fault, Kind, whole_faults
 from kincompile.checker.formula_faults import (
     Symbols,
     everywhere,
@@ -37,6 +31,7 @@ from kincompile.checker.formula_faults import (
     swaps,
     times,
 )
+from kincompile.checker.gamma_faults import collected, missing_parts, total, wrong_velocities
 from kincompile.checker.plain_text import described
 from kincompile.checker.vectors import (
     NumericExpansion,
@@ -52,29 +47,16 @@ from kincompile.model.relative import RelativeAngle
 from kincompile.names import rate
 
 if TYPE_CHECKING:
+    from kincompile.checker.fault import Index, NumericFault
     from kincompile.checker.reference import Reference
     from kincompile.checker.states import Array, States
-    from kincompile.derive.derivation import RowBlock
     from kincompile.model.resolve import Joint
 
-HALF = Fraction(1, 2)
-PARTS_OF_GAMMA = (
-    (Kind.QUADRATIC_TERM, "-(Phi_q q_dot)_q q_dot is missing"),
-    (Kind.CROSS_TERM, "-2 Phi_qt q_dot is missing"),
-    (Kind.PHI_TT, "-Phi_tt is missing"),
-)
-"""The parts of gamma in order, and the faults of leaving them out."""
 _ANY = ex.VectorSymbol("any")
 """Stands for the vector that a rotation turns, whichever it is."""
 
-Index = tuple[int, int]
-"""Row and column of an entry; the column of a vector is 0."""
-
-Parts = Mapping[Index, ex.Expression]
+Parts = Mapping["Index", ex.Expression]
 """Formulas by number of the row block and of the coordinate."""
-
-NumericFault = Fault[Mapping[Index, "Array"]]
-"""A fault with the numbers that stand in the entries where it shows, shape (N,) each."""
 
 
 _ORDERS = {
@@ -245,11 +227,11 @@ class JointFaults:
         yield from one_place(_joined(expression), self._symbols)
         terms = collected(expression)
         if isinstance(expression, ex.Scalar) and sum(len(term.rates) for term in terms) > 1:
-            yield from one_place(_sum(tuple(term.expression for term in terms)), self._symbols)
+            yield from one_place(total(tuple(term.expression for term in terms)), self._symbols)
         if self._quantity == "gamma":
-            yield from _wrong_velocities(terms)
+            yield from wrong_velocities(terms)
         if self._quantity == "gamma":
-            yield from _missing_parts_of_gamma(self._blocks[place[0]])
+            yield from missing_parts(self._blocks[place[0]])
 
     def _exchanged_blocks(self) -> Iterator[Fault[Parts]]:
         other = {0: 2, 1: 3, 2: 0, 3: 1}
@@ -426,78 +408,3 @@ def _exchanged_names(parts: Parts, symbols: Symbols) -> Iterator[Fault[Parts]]:
         yield Fault(Kind.MIXED_ANGLES, text, _changed(parts, angles))
     text = "the points of bodies i and j are exchanged throughout"
     yield Fault(Kind.MIXED_POINTS, text, _changed(parts, points))
-
-
-def _missing_parts_of_gamma(block: RowBlock) -> Iterator[Fault[ex.Expression]]:
-    """Yield gamma without one of its three parts, or with the cross term taken once."""
-    for k, (kind, text) in enumerate(PARTS_OF_GAMMA):
-        rest = (*block.gamma_terms[:k], *block.gamma_terms[k + 1 :])
-        # Without its only term gamma is left zero, which has a name already.
-        if any(term not in (ex.ZERO, ex.ZERO_VECTOR) for term in rest):
-            yield Fault(kind, text, _sum(rest))
-    quadratic, cross, second = block.gamma_terms
-    once = _sum((quadratic, times(HALF, cross), second))
-    yield Fault(Kind.FACTOR, "the 2 of 2 Phi_qt q_dot is missing", once)
-
-
-def _sum(terms: tuple[ex.Expression, ...]) -> ex.Expression:
-    vectors = tuple(item for item in terms if isinstance(item, ex.Vector))
-    return (
-        ex.VectorSum(vectors)
-        if vectors
-        else ex.Sum(tuple(item for item in terms if isinstance(item, ex.Scalar)))
-    )
-
-
-def _wrong_velocities(terms: tuple[CollectedTerm, ...]) -> Iterator[Fault[ex.Expression]]:
-    names = ("r_i_dot", "r_j_dot")
-    coupled = [term for term in terms if any(name in repr(term.product) for name in names)]
-    rest = tuple(term.expression for term in terms if term not in coupled)
-    if coupled and rest:
-        text = "the terms with w and r_j_dot - r_i_dot are missing"
-        yield Fault(Kind.COUPLING, text, _sum(rest))
-        halves = (times(HALF, term.expression) for term in coupled)
-        yield Fault(
-            Kind.FACTOR, "the 2 of 2 w (r_j_dot - r_i_dot) is missing", _sum((*rest, *halves))
-        )
-    for term in terms:
-        if square := perfect_square(term.rates):
-            others = tuple(item.expression for item in terms if item is not term)
-            yield from _wrong_squares(others, term, square)
-    parts: dict[ex.Scalar, list[ex.Expression]] = {}
-    for product, factor in ((term.product, factor) for term in terms for factor in term.factors):
-        parts.setdefault(_velocities(factor), []).append(times_product(factor, product))
-    for velocity, own in parts.items() if len(parts) > 1 else ():
-        if velocity != ex.ONE:
-            kept = [item for other, items in parts.items() if other != velocity for item in items]
-            multiple = partial(_plus_multiple, tuple(kept), _sum(tuple(own)))
-            yield from term_faults(f"the part with {described(velocity)}", multiple)
-
-
-def _plus_multiple(
-    kept: tuple[ex.Expression, ...], own: ex.Expression, factor: Fraction
-) -> ex.Expression:
-    return _sum((*kept, times(factor, own)) if factor else kept)
-
-
-def _wrong_squares(
-    others: tuple[ex.Expression, ...],
-    term: CollectedTerm,
-    square: tuple[ex.Scalar, ex.Scalar, Fraction],
-) -> Iterator[Fault[ex.Expression]]:
-    """Yield gamma with a wrong square of the difference of two velocities a and b."""
-    a, b, c = square
-    one, other = described(a), described(b)
-    for text, wrong in (
-        (f"{one}^2 - {other}^2 stands where {{}} belongs", a**2 - b**2),
-        (f"{other}^2 - {one}^2 stands where {{}} belongs", b**2 - a**2),
-        (f"({one}^2 - {other}^2)^2 stands where {{}} belongs", (a**2 - b**2) ** 2),
-        ("the mixed term of {} is missing", a**2 + b**2),
-    ):
-        result = _sum((*others, times_product(c * wrong, term.product)))
-        yield Fault(Kind.SQUARES, text.format(f"({one} - {other})^2"), result)
-
-
-def _velocities(term: ex.Scalar) -> ex.Scalar:
-    _, factors = ex.split_coefficient(term)
-    return ex.product_of(tuple(factor for factor in factors if is_rate(factor)))

@@ -6,124 +6,120 @@ sign, with a factor, or as if one of the load's own numbers were zero or reverse
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.checker.agreement import ABSOLUTE, agrees, is_undecided
-from kincompile.checker.comparison import ComparedEntry, Diagnosis, Verdict
-from kincompile.checker.diagnosis import undecided_diagnosis
+from kincompile.checker.agreement import ABSOLUTE, agrees, positive
+from kincompile.checker.comparison import Diagnosis
+from kincompile.checker.diagnosis import defined, looked_up
+from kincompile.checker.entry_faults import TypedEntry
 from kincompile.checker.fault import Fault, Kind, term_faults, whole_faults
-from kincompile.checker.reference import OF_LOADS, positive
+from kincompile.checker.judged import Judged, Laid
+from kincompile.checker.reference import OF_LOADS
 from kincompile.model.matrices import load_entries
 from kincompile.model.resolve import title_of
 from kincompile.quantities import quantity_named
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from fractions import Fraction
 
-    from kincompile.checker.agreement import Given, Right
+    from kincompile.checker.agreement import Right
+    from kincompile.checker.comparison import Convention
+    from kincompile.checker.fault import Index
+    from kincompile.checker.judged import Spot
     from kincompile.checker.reference import Reference
     from kincompile.checker.states import Array, States
     from kincompile.checker.written import Written
     from kincompile.model.resolve_loads import AppliedLoad
 
-UNEXPLAINED = "no slip with one of the loads gives these numbers."
 
-
-@dataclass(frozen=True)
-class LoadComparer:
+class LoadComparer(Judged):
     """One comparison of M and Q."""
 
-    reference: Reference
-    written: Mapping[str, Written]
-    states: States
-    strict: bool  # whether what is right by a convention alone is not accepted
+    def __init__(
+        self,
+        reference: Reference,
+        written: Mapping[str, Written],
+        states: States,
+        strict: bool,
+        convention: Convention | None = None,
+    ) -> None:
+        super().__init__(reference, states, strict, convention)
+        names, right = reference.coordinates, self._right()
+        is_plain = [convention is None] * len(names)
+        self._adopt({
+            name: Laid(
+                item, item.evaluate(states), right[name], names,
+                names if name == "M" else [None], is_plain,
+            )
+            for name, item in written.items()
+        })  # fmt: skip
 
-    @property
-    def wrong_count(self) -> int:
-        """The number of entries that differ."""
-        return sum(int((~equal).sum()) for equal in self._equal.values())
-
-    @cached_property
-    def _given(self) -> dict[str, Given]:
-        """What was written, (N, rows, columns) each."""
-        return {name: item.evaluate(self.states) for name, item in self.written.items()}
-
-    @cached_property
     def _right(self) -> dict[str, Right]:
-        """The derived M and Q with the scales of their entries: by row, in energies."""
-        expected, arms = self.reference.values(self.states), self.reference.arms[:, None]
+        """Return the derived M and Q with the scales of their entries: by row, in energies."""
+        expected, arms = self._reference.values(self._states), self._reference.arms[:, None]
         M, Q = (np.abs(expected.of(name)) * arms for name in OF_LOADS)
         energy = positive(np.max(M * arms.T, axis=-1, keepdims=True))
-        rate = self.reference.rate(self.states)
+        rate = self._reference.rate(self._states)
         scales = {"M": energy / (arms * arms.T), "Q": np.maximum(energy * rate**2, Q) / arms}
         return {
-            name: self.reference.right(expected.of(name), scale, self.states)
+            name: self._reference.right(expected.of(name), scale, self._states)
             for name, scale in scales.items()
         }
 
-    @cached_property
-    def _equal(self) -> dict[str, Array]:
+    def _values_at(self, states: States) -> dict[str, tuple[Array, Array]]:
+        right = self._reference.values(states)
         return {
-            name: np.all(agrees(given, self._right[name]), axis=0)
-            for name, given in self._given.items()
+            name: (laid.written.evaluate(states).values, right.of(name))
+            for name, laid in self._laid.items()
         }
 
-    def _is_undecided(self, name: str) -> Array:
-        given, right = self._given[name], self._right[name]
-        return np.asarray(np.all(agrees(given, right) | is_undecided(given, right), axis=0))
+    def _later(self, spot: Spot) -> Callable[[], str]:
+        return self._reference.later(*spot)
 
-    def entries(self, right: Verdict = Verdict.EQUAL) -> Iterator[ComparedEntry]:
-        """Yield all entries; those that agree have the verdict that is given."""
-        for name, item in self.written.items():
-            equal, undecided = self._equal[name], self._is_undecided(name)
-            explained = {} if equal.all() else self._explained(name)
-            for place in np.ndindex(*equal.shape):
-                row, column = place
-                given = self._given[name][:, row, column]
-                values = given.values, self._right[name].values[:, row, column]
-                verdict = right if equal[place] else Verdict.DIFFERENT
-                if undecided[place] and not equal[place]:
-                    verdict = Verdict.UNDECIDED
-                    explained[place] = (undecided_diagnosis(given),)
-                is_accepted = verdict is Verdict.EQUAL or (verdict.is_right and not self.strict)
-                yield ComparedEntry(
-                    name,
-                    self.reference.coordinates[row],
-                    self.reference.coordinates[column] if name == "M" else None,
-                    self.reference.later(name, row, column),
-                    item.texts[row][column],
-                    verdict,
-                    is_accepted,
-                    explained.get(place, ()),
-                    None if is_accepted else self.reference.difference(self.states, *values),
-                )
+    def _diagnoses(self) -> dict[Spot, tuple[Diagnosis, ...]]:
+        """Return the slips with loads that fit the best, and else those of an entry as typed."""
+        found: dict[Spot, tuple[Diagnosis, ...]] = {}
+        for name, laid in self._laid.items():
+            left, explained = defined(laid.shown(self._different(name)))
+            explained |= self._explained(name, left) if left else {}
+            left = {place: item for place, item in left.items() if place not in explained}
 
-    def _explained(self, name: str) -> dict[tuple[int, ...], tuple[Diagnosis, ...]]:
-        """Return the explanations of the entries that differ: the slips that fit the best."""
-        given, right = self._given[name], self._right[name]
-        wrong = [tuple(place) for place in np.argwhere(~self._equal[name]).tolist()]
-        found: dict[tuple[int, ...], list[tuple[int, Fault[Array]]]] = {item: [] for item in wrong}
+            def entry_of(place: Index, name: str = name) -> TypedEntry:
+                derived = self._reference.expression(name, *place)
+                return TypedEntry(self._reference, name, derived, self._states)
+
+            explained |= looked_up(left, laid.right.values, [], [], entry_of, tuple)
+            for place, items in explained.items():
+                spot = (name, *place)
+                found[spot] = items or (self._unexplained(spot),)
+        return found
+
+    def _explained(self, name: str, left: Iterable[Index]) -> dict[Index, tuple[Diagnosis, ...]]:
+        """Return the slips with loads, those with which the most entries of the quantity agree."""
+        laid, most = self._laid[name], dict.fromkeys(left, 0)
+        found: dict[Index, dict[Diagnosis, None]] = {}
         for fault in self._faults(name):
-            agreeing = np.all(agrees(given, replace(right, values=fault.result)), axis=0)
-            for place in wrong:
-                if agreeing[place]:
-                    found[place].append((int(agreeing.sum()), fault))
-        return {place: _best(faults) for place, faults in found.items()}
+            agreeing = np.all(agrees(laid.given, replace(laid.right, values=fault.result)), axis=0)
+            count = int(agreeing.sum())
+            for place in [place for place in most if agreeing[place] and count >= most[place]]:
+                if count > most[place]:
+                    most[place], found[place] = count, {}
+                found[place][Diagnosis(fault.kind, f"{fault.text}.")] = None
+        return {place: tuple(items) for place, items in found.items()}
 
     def _faults(self, name: str) -> Iterator[Fault[Array]]:
         """Yield the slips with one load, and with all of them."""
-        total = self.reference.values(self.states).of(name)
+        total = self._reference.values(self._states).of(name)
         yield from whole_faults(name, name, lambda factor: float(factor) * total)
-        for load in self.reference.system.loads:
+        for load in self._reference.system.loads:
             yield from self._faults_of(name, load, total)
 
     def _faults_of(self, name: str, load: AppliedLoad, total: Array) -> Iterator[Fault[Array]]:
-        own = self._added(name, load, self.states)
+        own = self._added(name, load, self._states)
         if not np.any(np.abs(own) > ABSOLUTE):
             return
 
@@ -132,11 +128,11 @@ class LoadComparer:
 
         title = title_of(load.written)
         yield from term_faults(f"what {title} adds to {name}", with_factor)
-        still = replace(self.states, q_dot=0 * self.states.q_dot)
+        still = replace(self._states, q_dot=0 * self._states.q_dot)
         text = f"terms with rates of {title} are missing in {name}"
         yield Fault(Kind.MISSING_RATE, text, total - own + self._added(name, load, still))
         for argument, zero, reverse in _changes(load):
-            without, opposite = (self._added(name, item, self.states) for item in (zero, reverse))
+            without, opposite = (self._added(name, item, self._states) for item in (zero, reverse))
             text = f"{title}: {argument} is counted as zero in {name}"
             yield Fault(Kind.WITHOUT, text, total - own + without)
             text = f"{title}: {argument} has the wrong sign in {name}"
@@ -144,11 +140,11 @@ class LoadComparer:
 
     def _added(self, name: str, load: AppliedLoad, states: States) -> Array:
         """Return what a load adds at states, (N, rows, columns)."""
-        n = len(self.reference.coordinates)
+        n = len(self._reference.coordinates)
         size = n if quantity_named(name).is_matrix else 1
         found = np.zeros((len(states), n, size))
-        entries = list(load_entries(self.reference.system, load, name))
-        values, _ = self.reference.evaluate([value for _, _, value in entries], states)
+        entries = list(load_entries(self._reference.system, load, name))
+        values, _ = self._reference.evaluate([value for _, _, value in entries], states)
         for k, (row, column, _) in enumerate(entries):
             found[:, row, column] += values[:, k]
         return found
@@ -168,13 +164,3 @@ def _changes(load: AppliedLoad) -> Iterator[tuple[str, AppliedLoad, AppliedLoad]
             continue
         zero, opposite = changed
         yield name, zero, opposite
-
-
-def _best(faults: list[tuple[int, Fault[Array]]]) -> tuple[Diagnosis, ...]:
-    """Return the slips with which the most entries agree: they are equivalent to each other."""
-    if not faults:
-        return (Diagnosis("not in the catalogue", UNEXPLAINED),)
-    most = max(count for count, _ in faults)
-    return tuple(
-        dict.fromkeys(Diagnosis(f.kind, f"{f.text}.") for count, f in faults if count == most)
-    )

@@ -11,18 +11,22 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment  # type: ignore[attr-defined]
 
-from kincompile.checker.agreement import agrees, finite, multiple
+from kincompile.checker.agreement import Multiple, agrees, finite, joined, multiple
+from kincompile.checker.comparison import Convention
+from kincompile.checker.conventions import OPPOSITE
 from kincompile.checker.forms import Form, exchanged, jacobian_form, known_forms, own_form
 from kincompile.checker.layouts import Layout, other_layouts, usual_layout
 from kincompile.checker.reference import QUANTITIES
-from kincompile.checker.rows import match_rows
+from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from kincompile.checker.agreement import Given, Right
-    from kincompile.checker.reference import ConstraintBlock, Reference, Subject
+    from kincompile.checker.given_forms import Subject
+    from kincompile.checker.reference import ConstraintBlock, Reference
     from kincompile.checker.states import Array, States
     from kincompile.checker.written import Written
 
@@ -296,3 +300,89 @@ def _directions(values: Array) -> Array:
     """Return rows of length 1; their signs stay."""
     length = np.sqrt(np.sum(values**2, axis=-1, keepdims=True))
     return np.asarray(values / np.where(length == 0, 1.0, length))
+
+
+def match_rows(
+    written: Sequence[Given],
+    expected: Sequence[Right],
+    group: Array,
+    may_scale: bool,
+) -> tuple[list[int], list[Multiple]]:
+    """Return the generated row of each row, and the factor between them.
+
+    Parameters
+    ----------
+    written
+        The quantities that distinguish the rows, (N, rows, columns) each.
+    expected
+        The generated ones; Phi last.
+    group
+        The set of parameters of each state, shape (N,).
+    """
+
+    def pair(row: int, target: int) -> Multiple:
+        """Return the factor between two rows."""
+        given = [item[:, row] for item in written]
+        right = [item[:, target] for item in expected]
+        whole = multiple(joined(given), joined(right), group, may_scale)
+        if whole.share == 1.0 or len(given) == 1:
+            return whole
+        # Phi defines the constraint: the factor of a right Phi is the one Phi_q must have.
+        of_phi = multiple(given[-1], right[-1], group, may_scale)
+        return Multiple(of_phi.factor, whole.share) if of_phi.share == 1.0 else whole
+
+    rows = list(range(expected[0].values.shape[1]))
+    found = {(k, k): pair(k, k) for k in rows}
+    unmatched = [k for k in rows if found[k, k].share < 1.0]
+    cost = np.full((len(unmatched), len(unmatched)), 2.0)
+    for a, row in enumerate(unmatched):
+        for b, target in enumerate(unmatched):
+            share = found.setdefault((row, target), pair(row, target)).share
+            # A row that is only nearly another one stays in its place.
+            cost[a, b] = (0.0 if share == 1.0 else 1.0 - 0.1 * share) + 0.2 * (row != target)
+    for a, b in zip(*linear_sum_assignment(cost), strict=True):
+        rows[unmatched[a]] = unmatched[b]
+    return rows, [found[k, target] for k, target in enumerate(rows)]
+
+
+def conventions_found(matching: Matching, reference: Reference) -> Iterator[Convention]:
+    """Yield the conventions of a matching."""
+    yield from [reference.convention] if reference.convention else []
+    equations = reference.equations
+    if text := matching.layout.convention:
+        kind = "ground columns" if "ground" in text else "order of columns"
+        order = ["(ground)" if k is None else reference.coordinates[k]
+                 for k in matching.layout.columns]  # fmt: skip
+        yield Convention(kind, f"Phi_q: {text}, the same in all rows: {listed(order, 30)}.")
+    parts = ["angles are taken in degrees"] if matching.units.takes_degrees else []
+    parts += ["derivatives are per degree"] if matching.units.per_degree else []
+    if parts:
+        yield Convention("degrees", f"{'; '.join(parts)}.")
+    names = [equations[row] for row in matching.rows]
+    if moved := matching.moved:
+        pairs = listed([f"row {k + 1} is {names[k]}" for k in moved], 30)
+        rows = tuple(names[k] for k in moved)
+        yield Convention("order of rows", f"the rows have another order: {pairs}.", rows)
+    for form in matching.forms:
+        own = tuple(equations[row] for row in form.rows)
+        yield Convention(form.kind, f"{listed(own)}: {form.text}.", own)
+    yield from _row_factors(matching, names)
+    for name, sign in matching.signs.items():
+        if sign < 0:
+            text = f"{name} is the {OPPOSITE[name]}, as stated: it has the opposite sign."
+            yield Convention(f"sign of {name}", text)
+
+
+def _row_factors(matching: Matching, names: Sequence[str]) -> Iterator[Convention]:
+    """Yield the signs and scales of rows."""
+    factors = list(zip(names, matching.factors, strict=True))
+    opposite = tuple(name for name, factor in factors if np.all(factor == -1))
+    if opposite:
+        text = f"{listed(opposite)}: written with the opposite sign."
+        yield Convention("row sign", text, opposite)
+    for name, factor in factors:
+        if name not in opposite and np.any(factor != 1):
+            is_number = np.ptp(factor) <= 1e-9 * abs(factor[0])
+            size = f"{factor[0]:.6g}" if is_number else "a factor that depends on parameters"
+            text = f"{name}: written as {size} times the generated equation."
+            yield Convention("row scale", text, (name,))

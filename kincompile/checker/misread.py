@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sympy
 
-from kincompile.checker.agreement import is_close
-from kincompile.checker.fault import Fault, Kind
+from kincompile.checker.fault import Kind, showing
 from kincompile.model.resolve import FreeEquation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator
 
-    from kincompile.checker.joint_faults import NumericFault
+    from kincompile.checker.fault import NumericFault
     from kincompile.checker.reference import ConstraintBlock, Reference
     from kincompile.checker.states import Array, States
 
@@ -91,13 +90,8 @@ class Misread:
     ) -> Iterator[NumericFault]:
         """Yield a fault in all rows of the constraint, and in each of them."""
         right, rows = self.right_at(self.states), self.block.rows
-        places = [
-            (i, j) for j in columns for i in rows if not is_close(other[:, i, j], right[:, i, j])
-        ]
         for chosen in (rows, *((row,) for row in rows if len(rows) > 1)):
-            result = {(i, j): other[:, i, j] for i, j in places if i in chosen}
-            if result:
-                yield Fault(kind, text, result)
+            yield from showing(kind, text, other, right, [(i, j) for j in columns for i in chosen])
 
     def _reversed(self, name: str) -> tuple[str, str]:
         """Return kind and text of a coordinate with the wrong sign."""

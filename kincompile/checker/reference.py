@@ -13,9 +13,8 @@ import numpy as np
 import sympy
 
 from kincompile import quantities
-from kincompile.checker.agreement import OF_ROW, ROUNDING, Right, finite
+from kincompile.checker.agreement import OF_ROW, ROUNDING, Right, finite, positive
 from kincompile.checker.comparison import Difference
-from kincompile.checker.naming import mechanism_help, mechanism_names
 from kincompile.checker.rounding import cancelled
 from kincompile.checker.states import (
     SEED,
@@ -23,6 +22,7 @@ from kincompile.checker.states import (
     States,
     consistent_states,
     default_parameters,
+    given_states,
     is_angular,
     random_states,
 )
@@ -38,6 +38,8 @@ from kincompile.names import listed, rate, suggestion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Mapping, Sequence
+
+    from numpy.typing import ArrayLike
 
     from kincompile.checker.comparison import Convention
     from kincompile.ir.graph import Node
@@ -85,10 +87,9 @@ class Values:
         return array if quantities.quantity_named(quantity).is_matrix else array[..., None]
 
 
-def positive(scale: Array) -> Array:
-    """Return scales by row, (N, rows, 1), with the largest in the place of zeros, or 1."""
-    scale = np.where(scale > 0, scale, np.max(scale, axis=1, keepdims=True))
-    return np.where(scale > 0, scale, 1.0)
+def numbered(letter: str, number: int, name: str) -> list[tuple[str, str]]:
+    """Return how a name may be written by its number."""
+    return [(f"{letter}{number}", name), (f"{letter}_{number}", name)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +113,10 @@ class Reference:
     ----------
     kept
         What comparisons at the random states have found out about the system, for the next ones.
+    name
+        Name of the mechanism.
+    own
+        Names of its parameters.
     base
         The formulas by the coordinates of the system; itself, except in another form.
     arms
@@ -130,6 +135,8 @@ class Reference:
 
     def __init__(self, model: Mechanism | ConstraintSystem) -> None:
         self.system = system_of(model)
+        self.name = self.system.name
+        self.own = tuple(item.name for item in self.system.parameters)
         self.program = lower(self.system)
         self.base = self
         self.constraints = tuple(self.system.constraints)
@@ -156,6 +163,7 @@ class Reference:
     def _share(self, base: Reference) -> None:
         """Take from another reference to the same system what does not depend on columns."""
         self.base, self.system, self.program = base, base.system, base.program
+        self.name, self.own = base.name, base.own
         self.spins, self.rates, self.defaults = base.spins, base.rates, base.defaults
         self._evaluated, self._inputs = base._evaluated, base._inputs
         self._values, self.kept = WeakKeyDictionary(), {}
@@ -167,7 +175,7 @@ class Reference:
     @property
     def symbols(self) -> tuple[str, ...]:
         """Names of values, one of which may be written for another: coordinates, parameters."""
-        return (*self.base.coordinates, *(item.name for item in self.system.parameters))
+        return (*self.base.coordinates, *self.own)
 
     @property
     def angles(self) -> tuple[str, ...]:
@@ -176,12 +184,32 @@ class Reference:
         return tuple(name for name, is_angle in pairs if is_angle)
 
     def names(self) -> tuple[tuple[str, str], ...]:
-        """Return names that formulas use, each with the symbol that it is and that has a rate."""
-        return mechanism_names(self.system, self.coordinates)
+        """Return names that formulas use, each with the symbol that it is and that has a rate.
+
+        Courses number them: x1, y1, phi1, also x_1, are those of body 1, and q1 of all.
+        """
+        found = [(name, name) for name in self.coordinates]
+        bodies = zip(self.system.bodies, self.body_columns, strict=True)
+        for number, (body, columns) in enumerate(bodies, 1):
+            for letter, column in zip(body.kind.letters, columns, strict=True):
+                found += numbered(letter, number, self.coordinates[column])
+        for number, name in enumerate(self.coordinates, 1):
+            found += numbered("q", number, name)
+        return tuple(found)
 
     def names_help(self) -> str:
         """Return in words which names formulas may use."""
-        return mechanism_help(self.system, self.coordinates, self.spins)
+        names = [*self.coordinates, *self.own, "t"]
+        text = f"the names are: {listed(names, 60)}, and rates such as {rate(names[0])}"
+        if self.spins:
+            text += f", {listed(self.spins, 6)}"
+        if self.system.bodies:
+            numbers = listed(f"{k} {body.name}" for k, body in enumerate(self.system.bodies, 1))
+            text += (
+                f"; bodies are numbered: {numbers}, so that x1 is {self.coordinates[0]}; for a "
+                "name of your own write a line 'name = formula'"
+            )
+        return text
 
     def arguments(self, quantity: str, given: Sequence[str] | None) -> list[tuple[str, ...]]:
         """Return what a function of a quantity is called with: a choice of names of values.
@@ -202,6 +230,13 @@ class Reference:
                 f"{quantity}: the function takes {len(given)} arguments; expected {names}."
             )
         return [(*names, "p") if given is None or len(given) > len(names) else names]
+
+    def method(
+        self, quantity: str, function: Any, names: Sequence[str] | None
+    ) -> tuple[Callable[..., object], tuple[str, ...]] | None:
+        """Return a method of a transmission with its arguments: of a mechanism there are none."""
+        del quantity, function, names
+        return None
 
     def argument(self, name: str, states: States) -> Array:
         """Return values that a function is called with, the states first."""
@@ -292,6 +327,15 @@ class Reference:
     def normalised(self, states: States) -> States:
         """Return states at which formulas in this form are compared: all, by r and p."""
         return states
+
+    @cached_property
+    def fixed(self) -> States:
+        """The same states with the default parameters."""
+        return self.random.with_default_parameters(self.defaults)
+
+    def given_states(self, given: Mapping[str, ArrayLike]) -> States:
+        """Return the states to which the values of arrays belong."""
+        return self.normalised(given_states(given, self.system))
 
     @cached_property
     def arms(self) -> Array:
@@ -453,43 +497,3 @@ def _converted(expressions: tuple[sympy.Expr, ...]) -> tuple[list[Node], list[li
     convert = Converter(graph, graph.input).convert
     terms = [[convert(term) for term in sympy.Add.make_args(item)] for item in expressions]
     return graph.nodes, terms
-
-
-@dataclass(frozen=True, slots=True)
-class Subject:
-    """What is compared: the equations of a system, or of one constraint, at some states."""
-
-    reference: Reference
-    block: ConstraintBlock | None
-    states: States
-
-    @property
-    def rows(self) -> tuple[int, ...]:
-        """The equations, as rows of the system."""
-        if self.block is not None:
-            return self.block.rows
-        return tuple(range(len(self.reference.equations)))
-
-    @property
-    def blocks(self) -> tuple[ConstraintBlock, ...]:
-        """The constraints."""
-        return self.reference.blocks if self.block is None else (self.block,)
-
-    def kept(self, key: Hashable, make: Callable[[], Kept]) -> Kept:
-        """Return what `make` gives; what belongs to the random states is made once."""
-        if self.states is not self.reference.random:
-            return make()
-        if key not in self.reference.kept:
-            self.reference.kept[key] = make()
-        found: Kept = self.reference.kept[key]
-        return found
-
-    def in_degrees(self, states: States) -> States:
-        """Return states with angles and their rates as numbers of degrees."""
-        if states is not self.states:
-            return states.in_degrees(self.reference.base.angular)
-        return self.kept("degrees", lambda: states.in_degrees(self.reference.base.angular))
-
-    def near(self, rows: Sequence[int]) -> States | None:
-        """Return states near the guess at which some of the system's equations hold, if any."""
-        return self.kept(("near", tuple(rows)), lambda: self.reference.near(rows, self.states))

@@ -27,6 +27,7 @@ from kincompile.names import rate
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from kincompile.checker.fault import Shown
     from kincompile.checker.reference import Reference
     from kincompile.checker.states import Array, States
 
@@ -41,9 +42,6 @@ MOST_SUMS = 100_000
 """Pairs of slips that are tried, of those whose sum is near enough in one weighted sum."""
 POWERS = tuple(map(sympy.Rational, ("1", "-1", "2", "-2", "1/2", "-1/2")))
 MULTIPLES = tuple(map(Fraction, ("-1", "0", "2", "1/2")))
-
-Shown = tuple["Array", "Array"]
-"""Values of an entry and what rounding may have taken from them, (N,) each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -195,7 +193,7 @@ class Slips:
             for own in sorted(function.free_symbols.intersection(symbols), key=str):
                 others = (function.xreplace({own: other}) for other in symbols)
                 for other in others:
-                    found |= dict.fromkeys((other, _partner(other)))
+                    found |= dict.fromkeys((other, partner(other)))
         if self._quantity in ("gamma", "J_dot"):
             known = reference.inputs(self._states)
             rates = (rate(name) for name in reference.symbols)
@@ -295,12 +293,12 @@ def _terms(
                 yield from _terms(factor, (*others, *factors[:k], *factors[k + 1 :]))
 
 
-def _partner(function: sympy.Expr) -> sympy.Expr:
-    """Return the cosine for a sine, and the sine for a cosine."""
+def partner(formula: sympy.Expr) -> sympy.Expr:
+    """Return a formula with a cosine for each sine, and a sine for each cosine."""
     # SymPy may have taken a sign out of it.
     pairs = {sympy.sin: sympy.cos, sympy.cos: sympy.sin}
-    own = function.atoms(sympy.sin, sympy.cos)
-    other: sympy.Expr = function.xreplace({item: pairs[item.func](*item.args) for item in own})
+    own = formula.atoms(sympy.sin, sympy.cos)
+    other: sympy.Expr = formula.xreplace({item: pairs[item.func](*item.args) for item in own})
     return other
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -14,42 +15,36 @@ from scipy.optimize import linear_sum_assignment  # type: ignore[attr-defined]
 from kincompile.checker.agreement import (
     OF_ROW,
     ON_MANIFOLD,
-    Given,
-    Right,
     agrees,
     finite,
     is_close,
-    is_undecided,
     tolerance,
 )
-from kincompile.checker.comparer import UNEXPLAINED
-from kincompile.checker.comparison import ComparedEntry, Convention, Diagnosis, Verdict
+from kincompile.checker.comparison import Convention, Diagnosis
 from kincompile.checker.conventions import LOAD
-from kincompile.checker.diagnosis import defined, looked_up, undecided_diagnosis
+from kincompile.checker.diagnosis import defined, looked_up
 from kincompile.checker.entry_faults import TypedEntry
 from kincompile.checker.fault import Fault, Kind
+from kincompile.checker.judged import UNEXPLAINED, Judged, Laid
 from kincompile.checker.reference import OF_TRANSMISSIONS
-from kincompile.checker.report import Report
-from kincompile.checker.transmission_faults import (
-    HandEntry,
-    Matrix,
-    MatrixFaults,
-    misread,
-    missing_terms,
-)
+from kincompile.checker.transmission_faults import Matrix, MatrixFaults, misread, missing_terms
 from kincompile.checker.transmission_maps import KINDS, Map, maps_at, turned
+from kincompile.checker.transmission_reference import PoseStates
 from kincompile.files.safe_expressions import extent
 from kincompile.model.expressions import symbol_names
 from kincompile.names import listed, rate
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping
 
     from kincompile.checker.conventions import Stated
-    from kincompile.checker.joint_faults import Index, NumericFault
-    from kincompile.checker.states import Array
-    from kincompile.checker.transmission_reference import PoseStates, TransmissionReference
+    from kincompile.checker.fault import Index, NumericFault
+    from kincompile.checker.judged import Spot
+    from kincompile.checker.states import Array, States
+    from kincompile.checker.transmission_reference import TransmissionReference
     from kincompile.checker.written import Written
+
+Names = Sequence["str | None"]
 
 MOST_PERMUTED = 16
 """Rows and columns whose order is looked for; that takes as many trials as rows squared."""
@@ -59,103 +54,89 @@ NOT_ENERGY = "energy is not conserved: effort is not J^T of the velocities"
 
 
 @dataclass(frozen=True, eq=False)
-class Laid:
-    """A quantity by hand as it is laid out, with the right values in that order."""
+class LaidMap(Laid):
+    """A quantity of a transmission as it is laid out: which map it is, and in which order."""
 
     quantity: str
-    written: Written
-    given: Given
-    right: Right
     map: Map
-    rows: tuple[int, ...]
-    columns: tuple[int, ...]
+    order: tuple[tuple[int, ...], tuple[int, ...]]  # of its rows and its columns
 
-    @cached_property
-    def equal(self) -> Array:
-        """Which entries are right at all states, (rows, columns)."""
-        return np.asarray(np.all(agrees(self.given, self.right), axis=0))
-
-    @property
-    def wrong_count(self) -> int:
-        """The number of entries that differ."""
-        return int((~self.equal).sum())
-
-    @property
-    def row_names(self) -> tuple[str, ...]:
-        """Names of the rows as written."""
-        return tuple(self.map.rows[k] for k in self.rows)
-
-    @property
-    def column_names(self) -> tuple[str, ...]:
-        """Names of the columns as written."""
-        return tuple(self.map.columns[k] for k in self.columns)
-
-    def taken(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> Laid:
+    def taken(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> LaidMap:
         """Return the quantity, laid out plainly so far, with other right rows and columns."""
-        right = self.right[:, list(rows)][:, :, list(columns)]
-        return replace(self, right=right, rows=rows, columns=columns)
+        return replace(
+            self,
+            right=self.right[:, list(rows)][:, :, list(columns)],
+            rows=[self.map.rows[k] for k in rows],
+            columns=[self.map.columns[k] for k in columns],
+            order=(rows, columns),
+        )
+
+    @property
+    def matrix(self) -> Matrix:
+        """The matrix by hand beside the right one."""
+        rows, columns = tuple(self.rows), tuple(self.columns)
+        return Matrix(self.quantity, self.given.values, self.right.values, rows, columns)
 
     def conventions(self) -> Iterator[Convention]:
         """Yield what is another way of writing."""
         if text := KINDS.get(self.map.kind, ""):
             yield Convention(self.map.kind, f"{self.quantity}: {text}.")
-        if np.any(
-            self.right.values != self.map.right.values[:, list(self.rows)][:, :, list(self.columns)]
-        ):
+        if np.any(self.right.values != self.arranged(self.map.right.values)):
             text = f"{self.quantity}: angles are those of the mechanism but for whole turns."
             yield Convention("whole turns", text)
-        for what, order, names in (
-            ("rows", self.rows, self.row_names),
-            ("columns", self.columns, self.column_names),
+        for what, order, names in zip(
+            ("rows", "columns"), self.order, (self.rows, self.columns), strict=True
         ):
             if list(order) != sorted(order):
                 text = f"{self.quantity}: the {what} have another order: {listed(names, 30)}."
                 yield Convention(f"order of {what}", text)
 
+    def arranged(self, values: Array) -> Array:
+        """Return values of the map, (N, rows, columns), in this order."""
+        rows, columns = self.order
+        found: Array = values[:, list(rows)][:, :, list(columns)]
+        return found
 
-class TransmissionComparer:
+
+class TransmissionComparer(Judged):
     """One comparison at some poses, from the layout to the report."""
+
+    _reference: TransmissionReference
+    _states: PoseStates
 
     def __init__(
         self,
         reference: TransmissionReference,
         readings: Mapping[str, Sequence[Written]],
-        states: PoseStates,
+        states: States,
         stated: Stated,
         strict: bool,
+        convention: Convention | None = None,
     ) -> None:
-        self._reference, self._states = reference, states
-        self._stated, self._strict = stated, strict
+        assert isinstance(states, PoseStates)
+        super().__init__(reference, states, strict, convention)
+        self._stated = stated
         self._maps = maps_at(
             reference, states, with_rates="J_dot" in readings, is_load=stated.is_load
         )
         self._faults = MatrixFaults(reference, states)
-        self._laid: dict[str, Laid] = {}
+        self._found: dict[str, LaidMap] = {}
         for name in sorted(readings, key=OF_TRANSMISSIONS.index):  # J first: others belong to it
-            self._laid[name] = self._best(name, readings[name])
+            self._found[name] = self._best(name, readings[name])
+        self._adopt({
+            name: replace(
+                laid, is_plain=[not (convention or [*laid.conventions()])] * len(laid.rows)
+            )
+            for name, laid in self._found.items()
+        })  # fmt: skip
 
-    @property
-    def wrong_count(self) -> int:
-        """The number of entries that differ."""
-        return sum(item.wrong_count for item in self._laid.values())
+    def _conventions(self) -> Iterator[Convention]:
+        found = [item for laid in self._found.values() for item in laid.conventions()]
+        return iter(dict.fromkeys(found))
 
-    def report(self, convention: Convention | None = None) -> Report:
-        """Return the outcome."""
-        found = [convention] if convention else []
-        entries: list[ComparedEntry] = []
-        for laid in self._laid.values():
-            own = [*found[:1], *laid.conventions()] if convention else [*laid.conventions()]
-            exact = np.all(agrees(laid.given.exact, laid.right), axis=0)
-            if np.any(laid.equal & ~exact):
-                text = f"{laid.quantity}: {laid.written.rounding}."
-                found.append(Convention("rounded numbers", text))
-            found += [item for item in own if item not in found]
-            entries += self._entries(laid, exact, bool(own))
-        return Report(self._reference.f.name, None, tuple(entries), tuple(found))
-
-    def _best(self, name: str, readings: Sequence[Written]) -> Laid:
+    def _best(self, name: str, readings: Sequence[Written]) -> LaidMap:
         """Return the layout with the fewest mistakes, the plain one first."""
-        best: Laid | None = None
+        best: LaidMap | None = None
         for written in readings:
             given = written.evaluate(self._states)
             for item in self._candidates(name, written):
@@ -164,10 +145,9 @@ class TransmissionComparer:
                 right = item.right
                 if name == "x":
                     right = turned(given.values, right, self._angular)
-                found = self._ordered(Laid(
-                    name, written, given, right, item,
-                    tuple(range(len(item.rows))), tuple(range(len(item.columns))),
-                ))  # fmt: skip
+                plain = LaidMap(written, given, right, (), (), (), name, item, ((), ()))
+                order = tuple(range(len(item.rows))), tuple(range(len(item.columns)))
+                found = self._ordered(plain.taken(*order))
                 if best is None or _is_better(found, best):
                     best = found
         assert best is not None, "shapes are checked before"
@@ -189,21 +169,21 @@ class TransmissionComparer:
         if name not in ("J", "J_dot"):
             return found
         stated = self._stated.kind or (found[0].kind if self._strict else "")
-        laid = self._laid.get("J")
+        laid = self._found.get("J")
         if name == "J_dot" and laid is not None and not laid.wrong_count:
             stated = laid.map.kind  # it is the rate of that J
         return [item for item in found if stated in ("", item.kind)]
 
-    def _ordered(self, plain: Laid) -> Laid:
+    def _ordered(self, plain: LaidMap) -> LaidMap:
         """Return rows and columns in the order in which they are right, if there is one.
 
         Beside a J that is right its order is that of J_dot; that of effort and x may be too.
         """
-        velocities, (count, width) = self._laid.get("J"), plain.equal.shape
+        velocities, (count, width) = self._found.get("J"), plain.equal.shape
         if self._strict or max(count, width) > MOST_PERMUTED:
             return plain
         if velocities is not None and not velocities.wrong_count:
-            names = velocities.row_names, velocities.column_names
+            names = velocities.rows, velocities.columns
             own = plain.taken(*(_order(x, names) for x in (plain.map.rows, plain.map.columns)))
             return (
                 own if plain.quantity == "J_dot" or own.wrong_count < plain.wrong_count else plain
@@ -215,82 +195,48 @@ class TransmissionComparer:
                 best = other
         return best
 
-    def _entries(self, laid: Laid, exact: Array, is_convention: bool) -> Iterator[ComparedEntry]:
-        """Yield all entries of a quantity."""
-        diagnoses = self._diagnoses(laid)
-        undecided = np.all(agrees(laid.given, laid.right) | is_undecided(laid.given, laid.right), 0)
-        for place in np.ndindex(*laid.equal.shape):
-            row, column = place
-            given = laid.given[:, row, column]
-            values = given.values, laid.right.values[:, row, column]
-            if laid.equal[place]:
-                is_plain = exact[place] and not is_convention
-                verdict = Verdict.EQUAL if is_plain else Verdict.CONVENTION
-            elif undecided[place]:
-                verdict = Verdict.UNDECIDED
-                diagnoses[place] = (undecided_diagnosis(given),)
-            else:
-                verdict = Verdict.DIFFERENT
-            accepted = verdict is Verdict.EQUAL or (verdict.is_right and not self._strict)
-            yield ComparedEntry(
-                laid.quantity,
-                laid.row_names[row],
-                laid.column_names[column] if laid.map.is_matrix else None,
-                self._later(values[1]),
-                laid.written.texts[row][column],
-                verdict,
-                accepted,
-                diagnoses.get(place, ()),
-                None if accepted else self._reference.difference(self._states, *values),
-            )
-
-    def _later(self, right: Array) -> Callable[[], str]:
+    def _later(self, spot: Spot) -> Callable[[], str]:
         """Return what gives a right value as text: a loop's formula is known by numbers alone."""
+        name, row, column = spot
+        right = self._laid[name].right.values[0, row, column]
         inputs = zip(self._reference.f.inputs, self._states.u[0], strict=True)
         where = ", ".join(f"{name} = {value:.6g}" for name, value in inputs)
-        return lambda: f"{right[0]:.9g} at {where}"
+        return lambda: f"{right:.9g} at {where}"
 
-    def _diagnoses(self, laid: Laid) -> dict[Index, tuple[Diagnosis, ...]]:
-        """Return the explanations of the entries that differ."""
-        wrong = [(i, j) for i, j in np.ndindex(*laid.equal.shape) if not laid.equal[i, j]]
-        if not wrong:
-            return {}
-        lost = tolerance(laid.given, laid.right)
-        written = {(i, j): (laid.given.values[:, i, j], lost[:, i, j]) for i, j in wrong}
-        left, found = defined(written)
+    def _diagnoses(self) -> dict[Spot, tuple[Diagnosis, ...]]:
+        found: dict[Spot, tuple[Diagnosis, ...]] = {}
+        for name, laid in self._found.items():
+            added = f"; {self._energy[name]}." if name in self._energy else "."
+            for place, items in self._explained(laid).items():
+                spot = (name, *place)
+                found[spot] = tuple(
+                    replace(item, text=item.text.removesuffix(".") + added)
+                    for item in items or (self._unexplained(spot),)
+                )
+        return found
 
-        parts = 0
+    def _explained(self, laid: LaidMap) -> dict[Index, tuple[Diagnosis, ...]]:
+        """Return the explanations of the entries that differ, none of what has no name."""
+        left, found = defined(laid.shown(self._different(laid.quantity)))
+        if not left:
+            return found
+        lost, parts = tolerance(laid.given, laid.right), 0
 
-        def entry_of(place: Index) -> HandEntry:
+        def entry_of(place: Index) -> TypedEntry | None:
             nonlocal parts
             expression, (i, j) = laid.written.formula(*place), place
             parts += extent(expression)[0] if expression is not None else 0
-            typed = None
-            if expression is not None and parts <= MOST_TAKEN_APART:
-                typed = TypedEntry(
-                    self._reference, laid.quantity, expression, self._states, is_by_hand=True
-                )
+            if expression is None or parts > MOST_TAKEN_APART:
+                return None
             right = laid.right.values[:, i, j], lost[:, i, j]
-            return HandEntry(typed, right, written[place][0])
+            return TypedEntry(self._reference, laid.quantity, expression, self._states, right)
 
-        entries = {place: entry_of(place) for place in left}
-        faults = [*self._of_matrix(laid)]
-        found |= looked_up(
-            left, laid.right.values, faults, [*self._of_names(laid)], entries.__getitem__, tuple
-        )
-        unexplained = (self._unexplained(laid),)
-        found = {place: found[place] or unexplained for place in wrong}
-        added = self._energy.get(laid.quantity, "")
-        return {
-            place: tuple(
-                replace(item, text=f"{item.text.removesuffix('.')}; {added}.") if added else item
-                for item in items
-            )
-            for place, items in found.items()
-        }
+        faults, several = [*self._of_matrix(laid)], [*self._of_names(laid)]
+        return found | looked_up(left, laid.right.values, faults, several, entry_of, tuple)
 
-    def _unexplained(self, laid: Laid) -> Diagnosis:
+    def _unexplained(self, spot: Spot) -> Diagnosis:
         """Return the sentence about an entry outside the catalogue."""
+        laid = self._found[spot[0]]
         if laid.quantity == "x" and self._is_another_assembly(laid):
             text = "these are the outputs of another assembly, on another branch."
             return Diagnosis(Kind.BRANCH, text)
@@ -299,29 +245,27 @@ class TransmissionComparer:
             text += " The values of an array belong to states: give states={'u': ...}."
         return Diagnosis(UNEXPLAINED, text)
 
-    def _is_another_assembly(self, laid: Laid) -> bool:
+    def _is_another_assembly(self, laid: LaidMap) -> bool:
         """Return whether outputs are those of another assembly, at two poses."""
         f, states, own = self._reference.f, self._states, self._reference.own
         for k in range(min(2, len(states))):
             p = dict(zip(own, states.p[k], strict=False))
             given = laid.given.values[k, :, 0]
-            others = f.assemblies(states.u[k], p=p)[:, list(laid.rows)]
+            others = f.assemblies(states.u[k], p=p)[:, list(laid.order[0])]
             off = others - given
-            turns = np.round(off / (2 * np.pi)) * self._angular[list(laid.rows)]
+            turns = np.round(off / (2 * np.pi)) * self._angular[list(laid.order[0])]
             off = np.abs(off - 2 * np.pi * turns)
             if not np.any(np.all(off <= ON_MANIFOLD * (1 + np.abs(given)), axis=-1)):
                 return False
         return True
 
-    def _of_names(self, laid: Laid) -> Iterator[NumericFault]:
+    def _of_names(self, laid: LaidMap) -> Iterator[NumericFault]:
         if laid.written.takes_states:
             yield from misread(self._reference, self._states, laid.written, laid.right.values)
 
-    def _of_matrix(self, laid: Laid) -> Iterator[NumericFault]:
+    def _of_matrix(self, laid: LaidMap) -> Iterator[NumericFault]:
         """Yield the faults of a whole quantity."""
-        matrix = Matrix(
-            laid.quantity, laid.given.values, laid.right.values, laid.row_names, laid.column_names
-        )
+        matrix = laid.matrix
         for other in self._maps[laid.quantity] if laid.map.is_matrix else ():
             if other.kind != laid.map.kind and other.right.values.shape == matrix.right.shape:
                 kind = Kind.INVERSE if "du/dx" in other.kind else Kind.WHOLE_TRANSPOSED
@@ -335,12 +279,10 @@ class TransmissionComparer:
             yield from missing_terms(self._terms(laid), matrix)
         yield from self._faults.of(matrix)
 
-    def _terms(self, laid: Laid) -> dict[str, Array]:
+    def _terms(self, laid: LaidMap) -> dict[str, Array]:
         """Return the terms of J_dot by rate, in the author's J if that is right, else by inputs."""
-        order, velocities = np.ix_(laid.rows, laid.columns), self._laid.get("J")
-        names, own = [*map(rate, self._reference.f.inputs)], {}
-        for name, item in zip(names, laid.map.terms, strict=True):
-            own[name] = item[:, order[0], order[1]]
+        velocities, names = self._found.get("J"), map(rate, self._reference.f.inputs)
+        own = {name: laid.arranged(item) for name, item in zip(names, laid.map.terms, strict=True)}
         known = (
             velocities is not None
             and not velocities.wrong_count
@@ -350,10 +292,10 @@ class TransmissionComparer:
             return own
         places = {
             (row, column): velocities.written.formula(i, k)
-            for i, row in enumerate(velocities.row_names)
-            for k, column in enumerate(velocities.column_names)
+            for i, row in enumerate(velocities.rows)
+            for k, column in enumerate(velocities.columns)
         }
-        rows, columns = laid.row_names, laid.column_names
+        rows, columns = laid.rows, laid.columns
         formulas = [places[row, column] for row in rows for column in columns]
         values = self._reference.inputs(self._states)
         symbols = {item for formula in formulas if formula for item in symbol_names(formula)}
@@ -364,11 +306,9 @@ class TransmissionComparer:
                 own[name] = found.reshape(-1, len(rows), len(columns))
         return own
 
-    def _of_effort(self, laid: Laid) -> Iterator[NumericFault]:
+    def _of_effort(self, laid: LaidMap) -> Iterator[NumericFault]:
         """Yield the faults of the matrix that effort is of the other side's efforts."""
-        vector = Matrix(
-            "effort", laid.given.values, laid.right.values, laid.row_names, laid.column_names
-        )
+        vector = laid.matrix
         text = "effort has the wrong sign"
         if not self._stated.is_load:
             text += f'; if {laid.map.effort} is a load, state effort = "{LOAD}" in [conventions]'
@@ -380,8 +320,8 @@ class TransmissionComparer:
         transposed = np.swapaxes(right, 1, 2)
         ends = f.outputs if laid.map.effort == "tau_x" else f.inputs
         names = tuple(f"tau_{name}" for name in ends)
-        right_rows = right[:, list(laid.rows)]
-        own = Matrix("effort", matrix, right_rows, laid.row_names, names, is_of_terms=True)
+        right_rows = right[:, list(laid.order[0])]
+        own = Matrix("effort", matrix, right_rows, tuple(laid.rows), names, is_of_terms=True)
         if right.shape[1] == right.shape[2]:
             inverse = np.linalg.inv(right)
             for kind, text, other in (
@@ -389,7 +329,7 @@ class TransmissionComparer:
                 (Kind.INVERSE, "the inverse of J", np.swapaxes(inverse, 1, 2)),
                 (Kind.INVERSE, "the transpose of the inverse of J", inverse),
             ):
-                values = (other @ tau[..., None])[:, list(laid.rows)]
+                values = (other @ tau[..., None])[:, list(laid.order[0])]
                 yield from vector.fault(kind, f"{text} stands where J^T belongs", values)
         # A fault of some entries of the matrix shows in the rows of effort in which they are.
         for fault in self._faults.of(own):
@@ -404,7 +344,7 @@ class TransmissionComparer:
                 rows = {(i, 0): laid.given.values[:, i, 0] for i, _ in fault.result}
                 yield Fault(fault.kind, fault.text, rows)
 
-    def _effort_matrix(self, laid: Laid) -> Array | None:
+    def _effort_matrix(self, laid: LaidMap) -> Array | None:
         """Return the matrix by hand, (N, rows, columns), None where effort is no such product."""
         if not laid.written.takes_states:
             return None
@@ -422,7 +362,7 @@ class TransmissionComparer:
     @cached_property
     def _energy(self) -> dict[str, str]:
         """What is to be said of J and effort where they do not belong together."""
-        velocities, effort = self._laid.get("J"), self._laid.get("effort")
+        velocities, effort = self._found.get("J"), self._found.get("effort")
         if effort is None or (
             not effort.wrong_count and (velocities is None or not velocities.wrong_count)
         ):
@@ -437,30 +377,29 @@ class TransmissionComparer:
             return {"effort": "it is J^T of your J, which is wrong: energy is conserved"}
         return {"effort": NOT_ENERGY}
 
-    def _belongs(self, velocities: Laid, effort: Laid) -> bool:
+    def _belongs(self, velocities: LaidMap, effort: LaidMap) -> bool:
         """Return whether the effort by hand is J^T of the J by hand."""
         matrix = self._effort_matrix(effort)
         own = np.empty_like(velocities.map.right.values)
-        own[:, np.array(velocities.rows)[:, None], np.array(velocities.columns)] = (
-            velocities.given.values
-        )
+        rows, columns = np.ix_(*velocities.order)
+        own[:, rows, columns] = velocities.given.values
         own = velocities.map.as_J(own)
         if matrix is None or effort.map.effort != "tau_x":
             return False
         by_row = np.empty_like(matrix)
-        by_row[:, list(effort.rows)] = -matrix if self._stated.is_load else matrix
+        by_row[:, list(effort.order[0])] = -matrix if self._stated.is_load else matrix
         return all(
             is_close(by_row[:, i, j], own[:, j, i]) for i, j in np.ndindex(*by_row.shape[1:])
         )
 
 
-def _order(own: Sequence[str], orders: Sequence[Sequence[str]]) -> tuple[int, ...]:
+def _order(own: Names, orders: Sequence[Names]) -> tuple[int, ...]:
     """Return rows or columns in the order that another quantity has for their names."""
     names = next((x for x in orders if set(x) == set(own)), own)
     return tuple(map(own.index, names))
 
 
-def _orders(plain: Laid) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
+def _orders(plain: LaidMap) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
     """Yield the right rows and columns that rows and columns by hand may be.
 
     Each row is taken for each right one. The entries that both have say which columns they are;
@@ -485,7 +424,7 @@ def _assigned(score: Array) -> Array:
     return np.asarray(linear_sum_assignment(score + np.eye(size) / (4 * size), maximize=True)[1])
 
 
-def _is_better(other: Laid, best: Laid) -> bool:
+def _is_better(other: LaidMap, best: LaidMap) -> bool:
     """Return whether a layout explains all that another one does, and most of the rest."""
     if other.wrong_count >= best.wrong_count:
         return False

@@ -14,18 +14,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sympy
 
-from kincompile.checker.agreement import ABSOLUTE, CLOSE, are_close, is_close
-from kincompile.checker.fault import NEAR, Fault, Kind, multiple_fault
-from kincompile.checker.turned import turned_vector
+from kincompile.checker.agreement import ABSOLUTE, CLOSE, are_close
+from kincompile.checker.fault import NEAR, Fault, Kind, multiple_fault, showing
+from kincompile.checker.given_forms import turned_vector
 from kincompile.errors import InputError
 from kincompile.names import listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from kincompile.checker.entry_faults import TypedEntry
-    from kincompile.checker.joint_faults import NumericFault
-    from kincompile.checker.slips import Shown
+    from kincompile.checker.fault import NumericFault
     from kincompile.checker.states import Array
     from kincompile.checker.transmission_reference import PoseStates, TransmissionReference
     from kincompile.checker.written import Written
@@ -51,8 +49,8 @@ class Matrix:
     name: str
     given: Array
     right: Array
-    rows: tuple[str, ...]
-    columns: tuple[str, ...]
+    rows: tuple[str | None, ...]
+    columns: tuple[str | None, ...]
     is_of_terms: bool = False
 
     @property
@@ -63,9 +61,7 @@ class Matrix:
 
     def fault(self, kind: str, text: str, values: Array) -> Iterator[NumericFault]:
         """Yield a fault with all entries in which it shows."""
-        places = np.argwhere(~are_close(values, self.right)).tolist()
-        if places:
-            yield Fault(kind, text, {(i, j): values[:, i, j] for i, j in places})
+        return showing(kind, text, values, self.right)
 
 
 def _back(faults: Iterable[NumericFault]) -> Iterator[NumericFault]:
@@ -164,22 +160,20 @@ class MatrixFaults:
 
     def _exchanged(self, matrix: Matrix, what: str) -> Iterator[NumericFault]:
         """Yield two columns in each other's place, in all rows or in one."""
+        kind = Kind.COLUMNS if what == "columns" else Kind.ROWS
         for a, b in combinations(range(len(matrix.columns)), 2):
             other = matrix.right.copy()
             other[:, :, [a, b]] = matrix.right[:, :, [b, a]]
             text = f"the {what} of {matrix.columns[a]} and {matrix.columns[b]} are exchanged"
-            yield from matrix.fault(Kind.COLUMNS if what == "columns" else Kind.ROWS, text, other)
-            for k in range(len(matrix.rows)) if len(matrix.rows) > 1 else ():
-                alone = matrix.right.copy()
-                alone[:, k] = other[:, k]
-                where = f"in the {'row' if what == 'columns' else 'column'} of {matrix.rows[k]}"
-                yield from matrix.fault(
-                    Kind.COLUMNS if what == "columns" else Kind.ROWS, f"{text} {where}", alone
-                )
+            yield from matrix.fault(kind, text, other)
+            for k, name in enumerate(matrix.rows if len(matrix.rows) > 1 else ()):
+                where = f"in the {'row' if what == 'columns' else 'column'} of {name}"
+                own = [(k, a), (k, b)]
+                yield from showing(kind, f"{text} {where}", other, matrix.right, own)
 
     def _frames(self, matrix: Matrix) -> Iterator[NumericFault]:
         """Yield two rows turned by an angle of the mechanism, and three by a body's rotation."""
-        units = [self._reference.f.units.get(name) for name in matrix.rows]
+        units = [self._reference.f.units.get(name or "") for name in matrix.rows]
         for a, b in combinations(range(len(units)), 2):
             if units[a] != units[b]:
                 continue
@@ -200,7 +194,7 @@ class MatrixFaults:
                 for text, rotation in self._rotations.items():
                     other = matrix.right.copy()
                     other[:, own] = rotation @ matrix.right[:, own]
-                    names = ", ".join(matrix.rows[k] for k in own)
+                    names = ", ".join(str(matrix.rows[k]) for k in own)
                     yield from matrix.fault(Kind.FRAME, f"{names} are in {text}", other)
 
     @cached_property
@@ -282,51 +276,6 @@ def _readings(
         if a != b:
             text = f"{a} stands where {b} belongs, throughout"
             yield Kind.OTHER_VARIABLE, text, {a: inputs[b]}
-
-
-@dataclass(frozen=True)
-class HandEntry:
-    """An entry by hand: what has to be corrected in it to give the right numbers.
-
-    Attributes
-    ----------
-    typed
-        Its formula; None of functions and arrays.
-    right
-        Its right values, and what rounding may take from them.
-    given
-        Its values by hand, (N,).
-    """
-
-    typed: TypedEntry | None
-    right: Shown
-    given: Array
-
-    @property
-    def faults(self) -> list[Fault[Array]]:
-        """The usual faults that it has."""
-        return [
-            replace(fault, result=self.given)
-            for fault in (self.typed.faults if self.typed else ())
-            if is_close(fault.result, *self.right)
-        ]
-
-    @property
-    def slips(self) -> HandEntry:
-        """All other slips: itself."""
-        return self
-
-    def one(self, given: Shown) -> Iterator[Fault[Array]]:
-        """Yield the slips that it has."""
-        del given
-        if self.typed:
-            yield from self.typed.slips.one(self.right)
-
-    def two(self, given: Shown) -> Iterator[Fault[Array]]:
-        """Yield two slips that it has at once."""
-        del given
-        if self.typed:
-            yield from self.typed.slips.two(self.right)
 
 
 def missing_terms(terms: Mapping[str, Array], matrix: Matrix) -> Iterator[NumericFault]:

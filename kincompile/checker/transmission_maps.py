@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.checker.agreement import OF_ROW, ROUNDING, Right
-from kincompile.checker.reference import positive
+from kincompile.checker.agreement import OF_ROW, ROUNDING, Right, positive
 
 if TYPE_CHECKING:
     from kincompile.checker.states import Array
@@ -37,7 +36,7 @@ class Map:
     right
         Its values, (N, rows, columns).
     rows, columns
-        Names of inputs and outputs; one column without a name of a vector.
+        Names of inputs and outputs; one column, None, of a vector.
     terms
         Of J_dot the terms of the chain rule, by the rate of each input.
     effort, matrix, tau
@@ -47,7 +46,7 @@ class Map:
     kind: str
     right: Right
     rows: tuple[str, ...]
-    columns: tuple[str, ...] = ("",)
+    columns: tuple[str | None, ...] = (None,)
     terms: tuple[Array, ...] = ()
     effort: str = ""
     matrix: Array = field(default_factory=lambda: np.empty((0, 0, 0)))
@@ -56,7 +55,7 @@ class Map:
     @property
     def is_matrix(self) -> bool:
         """Whether it has named columns."""
-        return self.columns != ("",)
+        return self.columns != (None,)
 
     def as_J(self, matrix: Array) -> Array:  # noqa: N802 - its name in the field
         """Return a matrix of this form, (N, rows, columns), as dx/du."""

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 
 from kincompile.checker.comparison import Difference
-from kincompile.checker.reference import Reference
+from kincompile.checker.reference import MATRICES, Reference, numbered
 from kincompile.checker.states import GROUPS, SEED, STATES_PER_GROUP, Array, States, shaped
 from kincompile.errors import InputError
+from kincompile.model.inputs import input_name
 from kincompile.names import listed, rate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
@@ -30,6 +31,8 @@ SPREADS = (1.0, 0.3, 0.1, 0.03, 0.01)
 OF_PARAMETERS = (0.9, 1.1)
 FASTEST = 50.0
 """Of coordinates by inputs, in scales: nearer to a singular pose digits are lost."""
+OF_INVERSE = {"u": "x", "u_dot": "x_dot", "tau_x": "tau_u"}
+"""What the arguments of the inverse's methods are of the transmission."""
 STEP = 20
 """Poses from which four of a set of parameters are taken."""
 
@@ -89,9 +92,8 @@ class TransmissionReference(Reference):
     def __init__(self, f: Transmission) -> None:
         super().__init__(f.system)
         self.f = f
-        parameters = [item.name for item in self.system.parameters]
-        count = len(parameters) - len(f.inputs) - len(f.signature.rates)
-        self.own = tuple(parameters[:count])
+        self.name = f.name
+        self.own = self.own[: len(self.own) - len(f.inputs) - len(f.signature.rates)]
         self.forces = {f"tau_{name}": f"tau_{name}" for name in (*f.outputs, *f.inputs)}
         for letter, names in (("x", f.outputs), ("u", f.inputs)):
             for k, name in enumerate(names, 1):
@@ -116,7 +118,7 @@ class TransmissionReference(Reference):
         pairs = [(name, name) for name in found]
         for letter, names in (("u", self.f.inputs), ("x", self.f.outputs), ("q", self.coordinates)):
             for number, name in enumerate(names, 1):
-                pairs += [(f"{letter}{number}", name), (f"{letter}_{number}", name)]
+                pairs += numbered(letter, number, name)
         return tuple(pair for pair in pairs if pair[1] not in self.f.twists)
 
     def names_help(self) -> str:
@@ -145,6 +147,57 @@ class TransmissionReference(Reference):
             )
         ends = [(name,) if more is None else (name, more[k]) for k, name in enumerate(("u", "x"))]
         return [(*item, "p") if number > count else item for item in ends]
+
+    def shape_problems(self, name: str, rows: int, columns: int) -> list[str]:
+        """Return what is wrong with the shape of a quantity."""
+        f = self.f
+        m, n = len(f.inputs), len(f.outputs)
+        if name in MATRICES:
+            if (rows, columns) in ((n, m), (m, n)):
+                return []
+            return [
+                f"{name} is {rows} x {columns}; expected {n} x {m}, a row for each of "
+                f"{listed(f.outputs)} and a column for each of {listed(f.inputs)}, or its transpose"
+            ]
+        if name == "x" and f.twists:
+            return [
+                f"x of {f.name} has velocities in it, {listed(f.twists)}, and no position gives "
+                "them: compare J, or leave them out of the outputs"
+            ]
+        names = f.outputs if name == "x" else f.inputs
+        if (rows, columns) == (len(names), 1):
+            return []
+        return [
+            f"{name} is {rows} x {columns}; it is a vector: expected {len(names)} rows, one for "
+            f"each of {listed(names)}"
+        ]
+
+    def method(
+        self, quantity: str, function: Any, names: Sequence[str] | None
+    ) -> tuple[Callable[..., object], tuple[str, ...]] | None:
+        """Return a method of a transmission, which takes parameters by name, and its arguments.
+
+        That of the inverse has outputs in the place of inputs.
+        """
+        f, own = self.f, getattr(function, "__self__", function)
+        if not isinstance(own, Transmission) or names is None:
+            return None
+        if own.inputs != f.inputs and not _are_same(own.inputs, f.outputs):
+            raise InputError(
+                f"{quantity} is a function of {listed(own.inputs)}; give one of "
+                f"{listed(f.inputs)}, or of {listed(f.outputs)}, in this order."
+            )
+        meant = names if own.inputs == f.inputs else [OF_INVERSE.get(name, name) for name in names]
+
+        def by_name(*arguments: Array) -> object:
+            pairs = zip(meant, arguments, strict=True)
+            return function(*(
+                dict(zip(self.own, values.T, strict=True)) if name == "p" else values
+                for name, values in pairs
+            ))  # fmt: skip
+
+        (arguments,) = self.arguments(quantity, meant)
+        return by_name, arguments
 
     def argument(self, name: str, states: States) -> Array:
         """Return values that a function is called with; p without the inputs."""
@@ -281,3 +334,9 @@ class TransmissionReference(Reference):
         found = super().difference(states, written, right)
         names = (*self.f.inputs, *self.f.outputs, *self.own)
         return Difference({name: found.state[name] for name in names}, found.generated, found.hand)
+
+
+def _are_same(one: Sequence[str], other: Sequence[str]) -> bool:
+    """Return whether names are the same, of drivers those that an inverse gives them."""
+    pairs = list(zip(one, other, strict=False))
+    return len(one) == len(other) and all(a == b or b in (input_name(a), a) for a, b in pairs)

@@ -242,8 +242,10 @@ def read_written(
     reference: Reference,
     at_states: bool,
     shape_problems: Callable[[int, int], list[str]],
-) -> Written:
-    """Read one quantity in any of the forms a user may give it.
+) -> list[Written]:
+    """Read one quantity in any of the forms a user may give it, in all ways it may be meant.
+
+    Of a transmission a function of one argument may be of the inputs or of the outputs.
 
     Parameters
     ----------
@@ -263,17 +265,16 @@ def read_written(
     if isinstance(given, list | tuple) and (numbers := _numbers(given)) is not None:
         given = numbers
     if isinstance(given, np.ndarray) and given.dtype != object:
-        return _from_array(quantity, given, at_states)
+        return [_from_array(quantity, given, at_states)]
     if callable(given) and not isinstance(given, sympy.Basic):
-        names, *_ = reference.arguments(quantity, argument_names(given))
-        return from_function(quantity, given, reference, names)
+        return _functions(quantity, given, reference)
     rows = _rows(quantity, given)
     _check_rectangular(quantity, rows)
     if quantity not in MATRICES and len(rows) == 1:
         rows = [[cell] for cell in rows[0]]
     if problems := shape_problems(len(rows), len(rows[0])):
         raise InputError(problems)
-    return _from_expressions(rows, _expressions(quantity, rows, words), reference)
+    return [_from_expressions(rows, _expressions(quantity, rows, words), reference)]
 
 
 def _expressions(quantity: str, rows: list[list[object]], words: Vocabulary) -> list[sympy.Expr]:
@@ -404,7 +405,19 @@ def _from_array(quantity: str, given: Array, at_states: bool) -> Written:
     return Written(texts, evaluate)
 
 
-def from_function(
+def _functions(
+    quantity: str, function: Callable[..., object], reference: Reference
+) -> list[Written]:
+    """Return a function in the ways in which its arguments may be meant."""
+    names = _argument_names(function)
+    if (method := reference.method(quantity, function, names)) is not None:
+        by_name, arguments = method
+        return [_from_function(quantity, by_name, reference, arguments, is_of_many=True)]
+    choices = reference.arguments(quantity, names)
+    return [_from_function(quantity, function, reference, item) for item in choices]
+
+
+def _from_function(
     quantity: str,
     function: Callable[..., object],
     reference: Reference,
@@ -465,7 +478,7 @@ def _of_states(quantity: str, values: Array) -> Array:
     return values.reshape(len(values), *(1,) * (3 - values.ndim), *values.shape[1:])
 
 
-def argument_names(function: Callable[..., object]) -> list[str] | None:
+def _argument_names(function: Callable[..., object]) -> list[str] | None:
     """Return the names of the arguments by position, None if they are not known."""
     try:
         found = list(inspect.signature(function).parameters.values())

@@ -11,8 +11,9 @@ import pytest
 
 from kincompile.checker.compare import compare
 from kincompile.checker.comparer import Comparer
+from kincompile.checker.given_forms import Subject
 from kincompile.checker.matrix_text import split_matrix
-from kincompile.checker.reference import Reference, Subject
+from kincompile.checker.reference import Reference
 from kincompile.checker.written import read_written, vocabulary
 from kincompile.files.text_places import TextPlace
 from tests.adversary.hidden import KINDS, SIZES, SMALL, zeros
@@ -49,7 +50,7 @@ def judged(item, zero):
     reference, _ = formulas(item["model"])
     words = vocabulary(reference, {})
     written = {
-        name: read_written(name, rows, words, reference, False, lambda *_: [])
+        name: read_written(name, rows, words, reference, False, lambda *_: [])[0]
         for name, rows in with_zero(item, zero).items()
     }
     return Comparer(Subject(reference, None, reference.random), written, {}, strict=False)

@@ -69,7 +69,9 @@ def test_that_loads_are_compared_beside_the_equations(pendulum):
         ("w^2*", "0*", "Q[x_bob]", "terms with rates of Mass 'bob' are missing in Q."),
         ("- f*dx/l", "+ f*dx/l", "Q[x_bob]", "what Spring 'spring' adds to Q has the wrong sign."),
         ("- f*dx/l", "", "Q[x_bob]", "what Spring 'spring' adds to Q is missing."),
-        ("+ t*c", "", "Q[y_bob]", None),
+        ("+ t*c", "", "Q[y_bob]", "a term is missing."),
+        ("+ t*c", "+ 5*t*c", "Q[y_bob]", "a term is 5 times what it should be."),
+        ("+ t*c", "+ t*c*exp(x1)", "Q[y_bob]", "no fault of the catalogue fits; the difference"),
         ("0.3 + 2*0.05", "0.3", "M[phi_bob, phi_bob]", "Mass 'bob': centre is counted as zero"),
         ("0.3 + 2*0.05", "2*0.05", "M[phi_bob, phi_bob]", "Mass 'bob': inertia is counted as zero"),
         ("+ 0.4*t - 0.1*3", "", "Q[phi_bob]", "FollowerForce 'push': point is counted as zero"),
@@ -83,10 +85,7 @@ def test_that_a_slip_is_named(pendulum, old, new, label, text):
     report = kc.compare(pendulum, **{name: written}, aliases=ALIASES)
     assert not report.equal
     texts = [diagnosis for _, diagnosis in kinds(report, label)]
-    if text is None:
-        assert texts == ["no slip with one of the loads gives these numbers."]
-    else:
-        assert any(item.startswith(text) for item in texts), texts
+    assert any(item.startswith(text) for item in texts), texts
 
 
 def test_that_aliases_of_a_slip_are_named(pendulum):
