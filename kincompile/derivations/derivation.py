@@ -200,11 +200,6 @@ def derivation(
 
 def _of_transmission(loop: Loop, state: Mapping[str, float] | float | None) -> Derivation:
     """Return how the Jacobian of a loop follows from its equations."""
-    if loop.twists:
-        raise InputError(
-            f"the derivation of a transmission has no velocities: leave out {listed(loop.twists)}, "
-            f"or derive those of {loop.system.name} from the slopes of its coordinates."
-        )
     chosen = evaluation_of(loop, state)
     chapters = unknowns_section(Figures(chosen)), transmission_section(chosen, loop)
     summary = f"{listed(loop.inputs)} to {listed(loop.outputs)}; {_summary(chosen)}"

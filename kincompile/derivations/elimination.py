@@ -25,7 +25,7 @@ from kincompile.ir.differentiate import tangents
 from kincompile.ir.elimination import plan_solve
 from kincompile.ir.graph import Graph, operands_of, pruned, reachable
 from kincompile.ir.interpret import apply
-from kincompile.names import column_name, listed, unknown
+from kincompile.names import column_name, listed, rate, unknown
 from kincompile.report.formulas import DerivativeSymbol, size
 from kincompile.runtime.solve import solve_sets
 
@@ -149,7 +149,8 @@ class Elimination:
     slopes
         Nodes of q_u: by coordinate, then by input.
     outputs, x_q, x_u
-        Nodes of the outputs, and of their derivatives by coordinates and by inputs.
+        Nodes of the outputs, and of their derivatives by coordinates and by inputs; of velocities
+        by the rates of these.
     J
         Nodes of dx/du: by output, then by input.
     """
@@ -180,8 +181,14 @@ class Elimination:
         names = code.program.names_of("outputs")
         known = {names[x.row]: x.node for x in (code.entries("outputs") if names else ())}
         self.outputs = [known.get(name, graph.input(name)) for name in loop.outputs]
-        self.x_q = _turned([self._partials(self.outputs, name) for name in chosen.coordinates])
-        self.x_u = _turned([self._partials(self.outputs, name) for name in loop.parameters])
+        # Of a velocity the derivatives by rates: q_u maps those of the inputs to them.
+        is_rate = [name in loop.twists for name in loop.outputs]
+        by_q, by_rates, by_u = (
+            _turned([self._partials(self.outputs, name) for name in names])
+            for names in (chosen.coordinates, map(rate, chosen.coordinates), loop.parameters)
+        )
+        self.x_q = _chosen(is_rate, by_rates, by_q)
+        self.x_u = _chosen(is_rate, [[graph.const(0)] * len(row) for row in by_u], by_u)
         self.J = [
             [self._chained(row, k, node) for k, node in enumerate(direct)]
             for row, direct in zip(self.x_q, self.x_u, strict=True)
@@ -264,6 +271,12 @@ class Elimination:
             return _in_decimals(short[0])
         a, b, c, d = short
         return _in_decimals(_shortened(a * d - b * c))
+
+
+def _chosen(
+    is_one: Sequence[bool], one: Sequence[list[int]], other: Sequence[list[int]]
+) -> list[list[int]]:
+    return [a if is_so else b for is_so, a, b in zip(is_one, one, other, strict=True)]
 
 
 def _shortened(found: sympy.Expr) -> sympy.Expr | None:

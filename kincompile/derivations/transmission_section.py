@@ -18,6 +18,7 @@ from kincompile.derivations.elimination import Elimination
 from kincompile.derivations.evaluation import is_number
 from kincompile.derivations.expanded import MINUS_ONE, minus
 from kincompile.ir.elimination import LARGEST_CLOSED_FORM
+from kincompile.names import rate
 from kincompile.report import formulas as fm
 from kincompile.report.document import Chapter, Display, Math, NotebookCode, Verbatim, table, text
 from kincompile.tables import counted
@@ -113,12 +114,20 @@ class _Steps:
             for name, parameter in zip(self.loop.inputs, self.loop.parameters, strict=True)
         ]
         for name, node in zip(self.loop.outputs, found.outputs, strict=True):
-            rows.append((Verbatim(name), "output", Math(Symbol(name)), _math(found.value(node))))
+            is_rate = name in self.loop.twists
+            value = "" if is_rate else _math(found.value(node))
+            kind = "velocity" if is_rate else "output"
+            rows.append((Verbatim(name), kind, Math(Symbol(name)), value))
         yield text(f"The numbers are those at {self.chosen.origin}.")
         yield table(("name", "", "symbol", "value"), rows)
         for name, node in zip(self.loop.outputs, found.outputs, strict=True):
             if name not in self.chosen.coordinates:
                 yield from self._shown(Symbol(name), found.writer.formula(node))
+        if self.loop.twists:
+            yield text(
+                f"Velocities, linear in the rates of coordinates: {', '.join(self.loop.twists)}. "
+                "They are the rates of no output; J maps the rates of the inputs to them."
+            )
         if self.loop.held:
             yield text(f"No output sees, and held is: {', '.join(self.loop.held)}.")
 
@@ -284,13 +293,18 @@ class _Steps:
     def _chain_rule(self) -> Iterator[Block]:
         found = self.found
         yield Display(fm.Equated((J, fm.Joined((X_Q, Q_U, "+", X_U)))))
+        if self.loop.twists:
+            yield text(
+                "A velocity has its derivatives by the rates of coordinates in the place of ",
+                Math(X_Q), ", since these are ", Math(fm.Joined((Q_U, RATES[0]))), ".",
+            )  # fmt: skip
         long: list[tuple[fm.DerivativeSymbol, int]] = []
         for name, row, direct in zip(self.loop.outputs, found.x_q, found.x_u, strict=True):
             if name in self.chosen.coordinates:
                 continue
             by = [*self.chosen.coordinates, *self.loop.parameters]
             for given, node in zip(by, (*row, *direct), strict=True):
-                left = fm.DerivativeSymbol(Symbol(name), Symbol(given))
+                left = fm.DerivativeSymbol(Symbol(name), self._way(name, given))
                 if is_long := self._symbolized(left, node):
                     long += is_long
                 elif not found.is_zero(node):
@@ -300,7 +314,7 @@ class _Steps:
             self.loop.outputs, found.x_q, found.x_u, found.J, strict=True
         ):
             for symbol, at_once, node in zip(self._inputs, direct, entries, strict=True):
-                left = _slope(Symbol(name), symbol)
+                left = _slope(Symbol(name), self._way(name, symbol.name))
                 parts = (
                     [] if name in self.chosen.coordinates else [self._chained(name, row, symbol)]
                 )
@@ -315,11 +329,15 @@ class _Steps:
         yield Display(fm.Equated((J, fm.decimals(found.array(found.J)))))
         yield self._again()
 
+    def _way(self, output: str, name: str) -> Symbol:
+        """Return by what an output is differentiated: a velocity by rates."""
+        return Symbol(rate(name) if output in self.loop.twists else name)
+
     def _chained(self, name: str, row: Sequence[int], symbol: Symbol) -> fm.Formula:
         parts: list[fm.Formula | str] = []
         for given, node in zip(self.chosen.coordinates, row, strict=True):
             if not self.found.is_zero(node):
-                own = fm.DerivativeSymbol(Symbol(name), Symbol(given))
+                own = fm.DerivativeSymbol(Symbol(name), self._way(name, given))
                 parts += ["+", own, _slope(Symbol(given), symbol)]
         return fm.Joined(tuple(parts[1:])) if parts else ZERO
 

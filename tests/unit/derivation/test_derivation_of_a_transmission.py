@@ -13,6 +13,7 @@ import kincompile as kc
 from kincompile.calculus.expressions import Symbol
 from kincompile.cli import cli
 from kincompile.errors import InputError
+from kincompile.names import rate
 from kincompile.report.document import Display, Math, Table
 from kincompile.report.formulas import (
     Decimal,
@@ -23,6 +24,7 @@ from kincompile.report.formulas import (
     Joined,
     Matrix,
 )
+from tests.goldens.test_goldens import is_pinned
 from tests.transmission_models import ankle, crank_rocker, differential, five_bar
 from tests.unit.derivation.test_derivation_is_the_code import evaluate
 
@@ -31,6 +33,7 @@ MODELS = {
     "crank_rocker": (crank_rocker, ["motor"], ["phi_rocker"]),
     "five_bar": (five_bar, ["motor_1", "motor_2"], ["end"]),
     "ankle": (ankle, ["left", "right"], ["pitch", "roll"]),
+    "spin": (ankle, ["left", "right"], ["omega_x_foot", "omega_eta_foot", "pitch"]),
     "differential": (differential, ["m_1", "m_2"], ["x_1", "x_2"]),
 }
 
@@ -85,7 +88,7 @@ def numbers_at(f: Any, model: Any, inputs: Any) -> dict[Any, Any]:
     slopes |= dict(zip(others, kc.transmission(model, inputs, others).J(f.home.u), strict=True))
     values: dict[Any, Any] = dict(zip(coordinates, f.home.q, strict=True))
     values |= dict(zip(f.module.PARAMETERS, f.home.p, strict=True))
-    values |= dict(zip(f.outputs, f.home.x, strict=True))
+    values |= {x: y for x, y in zip(f.outputs, f.home.x, strict=True) if x not in f.twists}
     Phi_q = f.module.Phi_q(f.home.q, 0.0, f.home.p)
     for row, name in enumerate(f.module.EQUATIONS):
         symbol = Glyph("Phi", name, bold=False)
@@ -94,9 +97,11 @@ def numbers_at(f: Any, model: Any, inputs: Any) -> dict[Any, Any]:
             values[DerivativeSymbol(symbol, Symbol(given))] = Phi_q[row, column]
     way = [0.7, -1.3][: len(f.inputs)]  # a change of all inputs at once
     for name, row in slopes.items():
+        values[name if name in f.twists else rate(name)] = float(row @ way)
         values[Differential(Symbol(name))] = float(row @ way)
         for parameter, slope in zip(f.loop.parameters, row, strict=True):
-            values[DerivativeSymbol(Symbol(name), Symbol(parameter), "d")] = slope
+            by = rate(parameter) if name in f.twists else parameter
+            values[DerivativeSymbol(Symbol(name), Symbol(by), "d")] = slope
     for parameter, change in zip(f.loop.parameters, way, strict=True):
         values[Differential(Symbol(parameter))] = change
     return values
@@ -139,7 +144,8 @@ def test_that_the_numbers_are_those_of_the_function(case: Any) -> None:
         if isinstance(line.parts[0], DerivativeSymbol) and isinstance(line.parts[-1], Decimal):
             symbol: Any = line.parts[0]
             shown[symbol.numerator.name, symbol.denominator.name] = line.parts[-1].value
-    names = [(x, u) for x in f.outputs for u in f.loop.parameters]
+    by = {x: [rate(u) if x in f.twists else u for u in f.loop.parameters] for x in f.outputs}
+    names = [(x, u) for x in f.outputs for u in by[x]]
     np.testing.assert_allclose([shown[name] for name in names], known.ravel(), 1e-12, 1e-13)
     np.testing.assert_allclose(jacobian_of(page), known, 1e-12, 1e-13)
 
@@ -181,6 +187,23 @@ def test_that_a_five_bar_is_singular_where_links_are_in_line() -> None:
     assert sympy.count_ops(found[-1]) == sympy.count_ops(wanted)
     assert float(found[-1].subs(values)) == pytest.approx(float(wanted.subs(values)), rel=1e-12)
     assert found[0].equals(0.0144 * folded)
+
+
+GOLDENS = Path(__file__).resolve().parents[2] / "data" / "derivations"
+
+
+@pytest.mark.skipif(not is_pinned(), reason="the bytes are those of the pinned SymPy")
+@pytest.mark.parametrize("name", ["crank_rocker", "five_bar"])
+def test_that_the_page_is_that_of_the_golden_file(
+    name: str, request: pytest.FixtureRequest
+) -> None:
+    """The part from Phi_q to J, as text."""
+    make, *ends = MODELS[name]
+    page = kc.derivation(make(), transmission=ends).to_markdown()  # type: ignore[operator]
+    text = page[page.index("## From Phi\\_q to the Jacobian J") :]
+    if request.config.getoption("--update-goldens"):
+        (GOLDENS / f"{name}.md").write_text(text, encoding="utf-8")
+    assert (GOLDENS / f"{name}.md").read_text(encoding="utf-8") == text
 
 
 def test_that_the_state_is_a_pose_on_the_branch() -> None:

@@ -148,8 +148,6 @@ def test_that_velocities_have_no_inverse_and_no_derivatives_by_parameters():
     with pytest.raises(kc.InputError, match="velocities among its outputs, drift, which no pos"):
         f.inverse([0.0, 0.0])
     assert len(f.assemblies([2.3, 0.9])) == 2
-    with pytest.raises(kc.InputError, match="has no velocities: leave out drift"):
-        kc.derivation(m, transmission=(["motor_1", "motor_2"], ["drift"]))
     assert np.isnan(f.by([2.3, 0.9], "length")[1]).all()
     with pytest.raises(kc.InputError, match="has no parameter 'v_motor_1'"):
         f([2.3, 0.9], p={"v_motor_1": 1.0})
