@@ -30,7 +30,7 @@ MOST_POSES = 100_000
 @click.option("--outputs", metavar="NAMES", help="Coordinates, outputs and points, likewise.")
 @click.option(
     "--grid", "grid", multiple=True, metavar="NAME=FIRST:LAST:COUNT",
-    help="Values of an input, such as crank=0:90deg:10; may be given several times.",
+    help="Values of an input, such as crank=0:90deg:10, or one, crank=30deg; several times.",
 )  # fmt: skip
 @click.option(
     "--effort", "efforts", multiple=True, metavar="NAME=VALUE",
@@ -52,9 +52,9 @@ def command(
     """Tabulate MODEL as a function of inputs: outputs, J, efforts and singularities.
 
     Inputs and outputs, and with them a grid and efforts, are those of the table [transmission] of
-    MODEL where options do not give them. Without a grid it is the first pose. The limits of the
-    inputs, each with the others held, come after it. The exit code is 3 where a pose of the grid
-    was not reached.
+    MODEL where options do not give them. Without a grid it is the first pose; an input without
+    values is held at its first one. The limits of the inputs, each with the others held, come
+    after it. The exit code is 3 where a pose of the grid was not reached.
     """
     read = read_model(model)
     given: dict[str, Any] = {"grid": {}, "efforts": {}}
@@ -93,8 +93,9 @@ def _grid(given: Sequence[str], f: kc.Transmission) -> dict[str, list[float]]:
     found = {}
     for item in given:
         name, _, text = item.partition("=")
-        parts, what = text.split(":"), f"--grid {item}: write NAME=FIRST:LAST:COUNT"
+        parts, what = text.split(":"), f"--grid {item}: write NAME=FIRST:LAST:COUNT or NAME=VALUE"
         (name,) = _named({name.strip(): 0}, f.inputs)
+        parts = [*parts, *parts, "1"] if len(parts) == 1 else parts
         count = parts[2] if len(parts) == 3 else ""
         if not count.isdecimal() or not 0 < int(count) <= MOST_POSES:
             raise InputError(f"{what}, with a count of 1 to {MOST_POSES:,}")

@@ -69,6 +69,38 @@ def test_that_poses_that_are_not_reached_end_with_3(four_bar):
     assert "1 of 2 poses were not reached, the first at motor = 2.5" in result.stderr
 
 
+def spheres(motors):
+    """Return the platform of the delta: where three spheres about the elbows meet, below."""
+    turns = 2 * np.pi * np.arange(3) / 3
+    out = 0.2 + 0.25 * np.cos(motors) - 0.05
+    centres = np.stack([out * np.cos(turns), out * np.sin(turns), -0.25 * np.sin(motors)], axis=1)
+    # The planes between spheres give a line: its points are first + s along.
+    rows = 2 * (centres[1:] - centres[0])
+    right = (centres[1:] ** 2).sum(axis=1) - (centres[0] ** 2).sum()
+    first = np.linalg.lstsq(rows, right, rcond=None)[0]
+    along = np.cross(*rows) / np.linalg.norm(np.cross(*rows))
+    along *= -np.sign(along[2])
+    apart = first - centres[0]
+    half = apart @ along
+    return first + (np.sqrt(half**2 - apart @ apart + 0.25) - half) * along
+
+
+@pytest.mark.slow
+def test_that_a_slice_of_three_inputs_is_tabulated():
+    """The third input of the delta is held by the table, or by an option with one value."""
+    path = FOLDER / "delta.toml"
+    for options, third in (((), 0.7), (("--grid", "motor_3=30deg"), np.pi / 6)):
+        result = run(path, *options)
+        assert result.exit_code == 0, result.output
+        lines = result.stdout.splitlines()
+        assert lines[1] == "6 poses"
+        rows = np.array([[float(text) for text in line.split()[:6]] for line in lines[4:10]])
+        np.testing.assert_allclose(rows[:, 2], third, rtol=1e-5)
+        for row in rows:
+            motors = *row[:2], third
+            np.testing.assert_allclose(row[3:], spheres(np.array(motors)), atol=1e-5)
+
+
 WRONG = [
     ((), "has no table [transmission]. Add one; its fields are: inputs, outputs, grid, efforts"),
     (("--inputs", "moter", "--outputs", "rocker.phi"), "did you mean 'motor'?"),
@@ -111,11 +143,14 @@ def test_that_wrong_tables_are_named(tmp_path, table, message):
 EXAMPLES = {
     "ankle": "actuators [0.207166 0.213622] m",  # golden, T3-SPU pose 2
     "crank_rocker": "ratio of the rates [0.4662,",
+    "delta": "motors [0.633316 0.506013 0.753213] rad",  # by three spheres, at (0, 0.05, -0.5)
     "five_bar": "motors [1.830595 0.942654] rad",  # golden, T6, the inverse at (0.02, 0.15)
 }
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "delta")) for name in EXAMPLES]
+)
 def test_that_an_example_is_the_same_as_data_and_prints_what_it_says(capsys, name):
     model = runpy.run_path(str(FOLDER / f"{name}.py"), run_name="__main__")["m"]
     assert EXAMPLES[name] in capsys.readouterr().out

@@ -79,6 +79,9 @@ WRONG = [
     (["motor"], [], "is given no outputs"),
     (["motor"], ["rocker.phi", "phi_rocker"], "is there 2 times: name it once"),
     (["motor", "rocker.phi"], ["coupler.x"], "1 degree of freedom for the inputs motor, phi_rocke"),
+    (["a"], ["rocker.phi"], "no driver and no coordinate 'a'. There are motor, x_crank,"),
+    (["crank"], ["rocker.phi"], "did you mean 'y_crank'? There are motor, x_crank,"),
+    (["motor"], ["rocker"], "did you mean 'y_rocker'?"),
     (["crank.phi"], ["rocker.phi"], "A driver with a number as its value counts as a joint"),
     (["motor"], ["late"], "output 'late' of four_bar depends on t"),
 ]

@@ -37,6 +37,23 @@ def test_that_power_in_is_power_out_at_1e5_random_poses(ankle):
     assert (np.abs(apart) <= 1e-13 * terms).all()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "middle", "far"), [("crank", [0.0], np.pi), ("five_bar", [1.9, 1.3], 0.2)]
+)
+def test_that_power_of_rates_is_power_of_efforts_at_1e5_random_poses(name, middle, far, request):
+    """Velocities are those of `rates`; of the crank with lengths that differ from pose to pose."""
+    f, rng = request.getfixturevalue(name), np.random.default_rng(2)
+    u = middle + rng.uniform(-far, far, (100_000, len(f.inputs)))
+    p = {"b": rng.uniform(0.118, 0.122, len(u))} if name == "crank" else None
+    u_dot, tau_x = rng.normal(size=u.shape), rng.normal(size=(len(u), len(f.outputs)))
+    (x_dot, _), tau_u = f.rates(u, u_dot, p=p), f.effort(u, tau_x, p=p)
+    assert np.isfinite(x_dot).all()
+    terms = np.abs(tau_x[:, :, np.newaxis] * f.J(u, p=p) * u_dot[:, np.newaxis]).sum(axis=(1, 2))
+    apart = (tau_u * u_dot).sum(axis=1) - (tau_x * x_dot).sum(axis=1)
+    assert (np.abs(apart) <= 1e-13 * terms).all()
+
+
 def psi(theta):
     """Return the rocker's angle by circles, in as many digits as are set."""
     a, b, c, d = (mpmath.mpf(text) for text in ("0.04", "0.12", "0.08", "0.13"))
@@ -53,6 +70,35 @@ def test_that_second_derivatives_are_those_of_differences_in_40_digits(crank):
             before, here, after = (psi(exact + k * h) for k in (-1, 0, 1))
             second = float((after - 2 * here + before) / h**2)
         assert crank.second([theta])[0, 0, 0] == pytest.approx(second, rel=1e-10, abs=1e-11)
+
+
+def end(first, second):
+    """Return the point of the five-bar by circles about its elbows, in any number of digits."""
+    arm, rod, half = (mpmath.mpf(text) for text in ("0.09", "0.12", "0.059"))
+    one = -half + arm * mpmath.expj(first)
+    other = half + arm * mpmath.expj(second)
+    along = (other - one) / 2
+    height = mpmath.sqrt(rod**2 - abs(along) ** 2)
+    return one + along + 1j * along / abs(along) * height
+
+
+def test_that_mixed_second_derivatives_are_those_of_differences_in_40_digits(five_bar):
+    for u in ([2.3, 0.9], [2.1, 1.1], [1.8, 1.4]):
+        with mpmath.workdps(40):
+            exact, h = [mpmath.mpf(x) for x in u], mpmath.mpf(10) ** -10
+            wanted = np.empty((2, 2, 2))
+            for j, k in np.ndindex(2, 2):
+                total = 0
+                for one, other in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+                    at = [*exact]
+                    at[j] += one * h
+                    at[k] += other * h
+                    total += one * other * end(*at)
+                slope = total / (4 * h**2)
+                wanted[:, j, k] = float(slope.real), float(slope.imag)
+            place = end(*exact)
+        np.testing.assert_allclose(five_bar(u), [float(place.real), float(place.imag)], atol=1e-14)
+        np.testing.assert_allclose(five_bar.second(u), wanted, rtol=1e-10, atol=1e-11)
 
 
 def test_that_a_full_turn_stays_on_its_assembly_and_comes_back(crank):
