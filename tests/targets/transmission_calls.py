@@ -62,10 +62,13 @@ def in_python(emitted, calls, tau, folder):
             state, status = module["start"](p, u, q)
             lines.append([status])
             continue
-        x, slopes, status = module["transmission"](state, given)
-        numbers = [*map(float, np.ravel(slopes)), *module["effort"](slopes, tau)]
-        row = [status, *map(float, x), *numbers]
-        lines.append(row)
+        if kind == "path":
+            found = list(zip(*module["transmission_batch"](state, given), strict=True))
+        else:
+            found = [module["transmission"](state, given)]
+        for x, slopes, status in found:
+            numbers = [*map(float, np.ravel(slopes)), *module["effort"](slopes, tau)]
+            lines.append([status, *map(float, x), *numbers])
     return lines
 
 
@@ -235,7 +238,7 @@ LANGUAGES = {
     "javascript": in_javascript,
     "rust": in_rust,
 }
-MOST = 200  # points of a path
+MOST = 240  # points of a path
 TOOLS = {"octave": OCTAVE, "javascript": NODE, "rust": RUSTC}
 
 
