@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError
+from kincompile.html import Shown
 from kincompile.names import column_name, escaped, listed, unknown
 from kincompile.runtime.status import Status
 from kincompile.sweeps.layout import PENDING, STATUS
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Sweep:
+class Sweep(Shown):
     """The results of a sweep; `str` says in a sentence how it went.
 
     Attributes
@@ -86,7 +87,7 @@ class Sweep:
                 found[PENDING] += contents.plan.grid.count(number) * per_variant
         return {status_name(number): found[number] for number in sorted(found)}
 
-    def __str__(self) -> str:
+    def to_text(self) -> str:
         """Return how many variants there are and how they ended."""
         plan, what = self.contents.plan, "points" if self.contents.layout.over_time else "motions"
         counts = ", ".join(f"{count:,} {name}" for name, count in self.statuses().items())
@@ -96,10 +97,10 @@ class Sweep:
             f"{place}; {what}: {counts}"
         )
 
-    def __repr__(self) -> str:
+    def headline(self) -> str:
         """Return one line, for which nothing is read."""
         names = listed(item.name for item in self.contents.layout.kept)
-        return f"<Sweep of {self.contents.name}: {self.contents.plan.grid.sizes}, {names}>"
+        return f"{self.contents.name}: {self.contents.plan.grid.sizes}, {names}"
 
 
 def status_name(number: int) -> str:

@@ -22,6 +22,7 @@ import numpy as np
 
 from kincompile.criteria import ROOT_LENGTH, SAME, SOLVED, STILL, ZERO
 from kincompile.errors import InputError
+from kincompile.html import Shown
 from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.driver_range import DriverRange, driver_ranges, driver_table
@@ -82,7 +83,7 @@ class OutputMeasures:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Measures:
+class Measures(Shown):
     """Measures of a motion: ``measures["ram.x"]`` gives those of an output; str is a table.
 
     Attributes
@@ -111,13 +112,11 @@ class Measures:
             )
         return found
 
-    def __repr__(self) -> str:
-        """Name the outputs and drivers."""
-        return (
-            f"<Measures of {self.name}: {listed([x.name for x in self.outputs]) or 'no outputs'}>"
-        )
+    def headline(self) -> str:
+        """Name the mechanism and its outputs."""
+        return f"{self.name}: {listed([x.name for x in self.outputs]) or 'no outputs'}"
 
-    def __str__(self) -> str:
+    def to_text(self) -> str:
         """Return tables of outputs and drivers."""
         return self.table()
 

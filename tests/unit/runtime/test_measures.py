@@ -1,5 +1,6 @@
 """Measures of outputs, and ranges of drivers, against closed forms."""
 
+import html
 import math
 import pickle
 
@@ -242,7 +243,8 @@ def test_the_tables(found):
     assert " ".join(lines["travel"][:8]) == "travel m 0 0.452254 0.12 0.952254 0.12 0.452254,"
     assert lines["turned"][-4:-2] == ["not", "cyclic"]
     assert "no limit met" in text
-    assert repr(found) == "<Measures of measured: x_end, y_end, travel, speed, pull, turned, fixed>"
+    assert repr(found) == "<Measures: measured: x_end, y_end, travel, speed, pull, turned, fixed>"
+    assert str(found) in html.unescape(found._repr_html_())
     assert found["end.x"] is found["x_end"]
 
 

@@ -96,6 +96,8 @@ def test_what_cannot_be_assembled_is_a_status_and_disturbs_nobody():
     assert "3 variants x 5 times; points: 10 CONVERGED, 4 NOT_REACHED, 1 NOT_ASSEMBLED" in str(
         found
     )
+    assert str(found) in found._repr_html_()
+    assert repr(found).startswith("<Sweep: ")
 
 
 def test_of_measures_alone_the_status_is_that_of_the_motion():
