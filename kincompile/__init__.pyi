@@ -38,6 +38,7 @@ from kincompile.files.file_format import model_schema as model_schema
 from kincompile.files.files import read as read
 from kincompile.files.files import read_analysis as read_analysis
 from kincompile.files.files import read_model as read_model
+from kincompile.functions.differentiable import jax as jax
 from kincompile.functions.poses import Poses as Poses
 from kincompile.functions.transmission import Transmission as Transmission
 from kincompile.functions.transmission import transmission as transmission

@@ -86,7 +86,7 @@ def _position(f, q, t, p):
     c_follower, s_follower = cos_sin(phi_follower)
     # 4-5  PointFollower "contact"
     contact_follower_x = 0.05 * s_follower
-    contact_rho_cam = spline(rho_j_contact, 0, alpha_contact)
+    contact_rho_cam = f.spline(rho_j_contact, 0, alpha_contact)
     cos_alpha_contact = cos(alpha_contact)
     sin_alpha_contact = sin(alpha_contact)
     contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
@@ -94,7 +94,7 @@ def _position(f, q, t, p):
     contact_7 = 0.05 * c_follower
     contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
     contact_9 = contact_rho_cam * contact_u_cam_y
-    contact_rho_cam_1 = spline(rho_j_contact, 1, alpha_contact)
+    contact_rho_cam_1 = f.spline(rho_j_contact, 1, alpha_contact)
     return (
         # Phi
         # 0-1  Revolute "shaft": cam (0, 0) - ground (0, 0)
@@ -135,14 +135,14 @@ def _gamma(f, q, q_dot, t, p):
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
     phi_follower_dot_sq = phi_follower_dot**2
-    contact_2 = spline(rho_j_contact, 2, alpha_contact) * alpha_contact_dot**2
+    contact_2 = f.spline(rho_j_contact, 2, alpha_contact) * alpha_contact_dot**2
     cos_alpha_contact = cos(alpha_contact)
     sin_alpha_contact = sin(alpha_contact)
     contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
-    contact_6 = 2 * spline(rho_j_contact, 1, alpha_contact) * alpha_contact_dot
+    contact_6 = 2 * f.spline(rho_j_contact, 1, alpha_contact) * alpha_contact_dot
     contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
     contact_8 = phi_cam_dot * contact_u_cam_y + alpha_contact_dot * contact_u_cam_y
-    contact_rho_cam = spline(rho_j_contact, 0, alpha_contact)
+    contact_rho_cam = f.spline(rho_j_contact, 0, alpha_contact)
     contact_10 = phi_cam_dot * contact_u_cam_x + alpha_contact_dot * contact_u_cam_x
     return (
         0, 0,  # 0-1  Revolute "shaft"
@@ -166,15 +166,15 @@ def _kinematics(f, q, q_dot, t, p):
     c_cam, s_cam = cos_sin(phi_cam)
     c_follower, s_follower = cos_sin(phi_follower)
     contact_follower_x = 0.05 * s_follower
-    contact_rho_cam = spline(rho_j_contact, 0, alpha_contact)
+    contact_rho_cam = f.spline(rho_j_contact, 0, alpha_contact)
     cos_alpha_contact, sin_alpha_contact = cos(alpha_contact), sin(alpha_contact)
     contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam
     contact_6, contact_7 = contact_rho_cam * contact_u_cam_x, 0.05 * c_follower
     contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam
     contact_9 = contact_rho_cam * contact_u_cam_y
-    contact_rho_cam_1 = spline(rho_j_contact, 1, alpha_contact)
+    contact_rho_cam_1 = f.spline(rho_j_contact, 1, alpha_contact)
     phi_follower_dot_sq = phi_follower_dot**2
-    contact_12 = spline(rho_j_contact, 2, alpha_contact) * alpha_contact_dot**2
+    contact_12 = f.spline(rho_j_contact, 2, alpha_contact) * alpha_contact_dot**2
     contact_13 = 2 * contact_rho_cam_1 * alpha_contact_dot
     contact_14 = phi_cam_dot * contact_u_cam_y + alpha_contact_dot * contact_u_cam_y
     contact_15 = phi_cam_dot * contact_u_cam_x + alpha_contact_dot * contact_u_cam_x
@@ -320,11 +320,27 @@ def _cos_sin(angle):
     return R - 1.0, t * R
 
 
+def spline(table, order, angle):
+    """A periodic spline, or its derivative of the given order, at an angle in rad."""
+    breaks, coefficients = table
+    first, last = breaks[0], breaks[-1]
+    real = np.real(angle)
+    place = first + (real - first) % (last - first)
+    piece = np.minimum(np.searchsorted(breaks, place, side="right") - 1, len(coefficients) - 1)
+    distance = place - breaks[piece] + (angle - real)  # the latter for complex-step checks
+    degree = coefficients.shape[1] - 1
+    value = 0.0
+    for power in range(degree, order - 1, -1):
+        value = value * distance + coefficients[piece, degree - power] * math.perm(power, order)
+    return value
+
+
 class FLOATS:
     """Elementary functions of one number."""
     cos = math.cos
     cos_sin = staticmethod(lambda angle, cos=math.cos, sin=math.sin: (cos(angle), sin(angle)))
     sin = math.sin
+    spline = staticmethod(spline)
 
 
 class ARRAYS:
@@ -332,6 +348,95 @@ class ARRAYS:
     cos = np.cos
     cos_sin = staticmethod(_cos_sin)
     sin = np.sin
+    spline = staticmethod(spline)
+
+
+class _Library:
+    """Elementary functions of another library: of its arrays, or of its numbers."""
+
+    def __init__(self, xp):
+        self.xp, self.has_arrays = xp, hasattr(xp, "asarray")
+        for name in ("cos", "sin"):
+            setattr(self, name, self.function(name))
+
+    def function(self, name, own=None):
+        """Return a function of the library; of plain numbers alone that of math."""
+        own = own or getattr(self.xp, name, None)
+
+        def call(*arguments):
+            if self.has_arrays and all(map(_is_plain, arguments)):
+                try:
+                    return getattr(math, name)(*arguments)
+                except (ArithmeticError, ValueError):
+                    return math.nan
+            if own is None:
+                library = getattr(self.xp, "__name__", type(self.xp).__name__)
+                raise InputError(
+                    f"{library} has no function {name}, which this code calls. "
+                    "Give a namespace with the names of the array API standard."
+                )
+            return own(*self.alike(arguments))
+
+        return call
+
+    def alike(self, values):
+        """Return numbers as arrays, as the first array is; other numbers as they are."""
+        if not self.has_arrays:
+            return values
+        like = next((x for x in values if not _is_plain(x)), None)
+        if like is None:
+            return [self.xp.asarray(x, dtype=self.xp.float64) for x in values]
+        return [self.xp.zeros_like(like) + x if _is_plain(x) else x for x in values]
+
+    def cos_sin(self, angle):
+        return self.cos(angle), self.sin(angle)
+
+    def spline(self, table, order, angle):
+        breaks, coefficients = table
+        first, last = float(breaks[0]), float(breaks[-1])
+        degree = coefficients.shape[1] - 1
+        if self.has_arrays and not _is_plain(angle):
+            place = first + (angle - first) % (last - first)
+            xp, shape = self.xp, place.shape
+            ends = xp.asarray(breaks[1:-1], dtype=place.dtype)
+            piece = xp.searchsorted(ends, xp.reshape(place, (-1,)), side="right")
+            columns = (
+                xp.take(xp.asarray(column, dtype=place.dtype), piece, axis=0)
+                for column in (breaks[:-1], *coefficients.T)
+            )
+            start, *taken = (xp.reshape(column, shape) for column in columns)
+        else:
+            try:
+                place = first + (angle - first) % (last - first)
+                piece = sum(place >= x for x in breaks[1:-1].tolist())
+            except TypeError:
+                raise InputError(
+                    "these numbers have no remainder or no order, which a spline needs. "
+                    "Give numbers that have, as those of mpmath.mp."
+                ) from None
+            start, taken = float(breaks[piece]), coefficients[piece].tolist()
+        value = 0.0
+        for power in range(degree, order - 1, -1):
+            value = value * (place - start) + taken[degree - power] * math.perm(power, order)
+        return value
+
+
+def _is_plain(x):
+    return isinstance(x, (int, float))
+
+
+def lanes(xp):
+    """LANES without f, on the arrays of another library, or on other numbers.
+
+    xp has the names of the array API standard, as jax.numpy, or those of them that this module calls
+    for numbers of another kind, as mpmath. Results that never change are plain numbers.
+    """
+    f = _Library(xp)
+
+    def without_f(function):
+        return lambda *arguments: function(f, *arguments)
+
+    return {name: without_f(function) for name, function in LANES.items()}
 
 
 class _Quantity:
@@ -513,21 +618,6 @@ def _checked(name, value, entries=None, axis=-1):
         found = ", ".join(x for x, row in zip(entries or (name,), rows) if not row.all())
         raise InputError(f"{NAME}: {name} is not finite in {found}; give finite numbers")
     return array
-
-
-def spline(table, order, angle):
-    """A periodic spline, or its derivative of the given order, at an angle in rad."""
-    breaks, coefficients = table
-    first, last = breaks[0], breaks[-1]
-    real = np.real(angle)
-    place = first + (real - first) % (last - first)
-    piece = np.minimum(np.searchsorted(breaks, place, side="right") - 1, len(coefficients) - 1)
-    distance = place - breaks[piece] + (angle - real)  # the latter for complex-step checks
-    degree = coefficients.shape[1] - 1
-    value = 0.0
-    for power in range(degree, order - 1, -1):
-        value = value * distance + coefficients[piece, degree - power] * math.perm(power, order)
-    return value
 
 
 # ---- march: a motion over times, on floats and lists. But for two tables it is alike in all modules.

@@ -1146,6 +1146,62 @@ class ARRAYS:
     sqrt = np.sqrt
 
 
+class _Library:
+    """Elementary functions of another library: of its arrays, or of its numbers."""
+
+    def __init__(self, xp):
+        self.xp, self.has_arrays = xp, hasattr(xp, "asarray")
+        for name in ("acos", "atan2", "cos", "sin", "sqrt"):
+            setattr(self, name, self.function(name))
+
+    def function(self, name, own=None):
+        """Return a function of the library; of plain numbers alone that of math."""
+        own = own or getattr(self.xp, name, None)
+
+        def call(*arguments):
+            if self.has_arrays and all(map(_is_plain, arguments)):
+                try:
+                    return getattr(math, name)(*arguments)
+                except (ArithmeticError, ValueError):
+                    return math.nan
+            if own is None:
+                library = getattr(self.xp, "__name__", type(self.xp).__name__)
+                raise InputError(
+                    f"{library} has no function {name}, which this code calls. "
+                    "Give a namespace with the names of the array API standard."
+                )
+            return own(*self.alike(arguments))
+
+        return call
+
+    def alike(self, values):
+        """Return numbers as arrays, as the first array is; other numbers as they are."""
+        if not self.has_arrays:
+            return values
+        like = next((x for x in values if not _is_plain(x)), None)
+        if like is None:
+            return [self.xp.asarray(x, dtype=self.xp.float64) for x in values]
+        return [self.xp.zeros_like(like) + x if _is_plain(x) else x for x in values]
+
+
+def _is_plain(x):
+    return isinstance(x, (int, float))
+
+
+def lanes(xp):
+    """LANES without f, on the arrays of another library, or on other numbers.
+
+    xp has the names of the array API standard, as jax.numpy, or those of them that this module calls
+    for numbers of another kind, as mpmath. Results that never change are plain numbers.
+    """
+    f = _Library(xp)
+
+    def without_f(function):
+        return lambda *arguments: function(f, *arguments)
+
+    return {name: without_f(function) for name, function in LANES.items()}
+
+
 class _Quantity:
     """A result: its shape, where its computed entries go, and its entries that never change."""
 

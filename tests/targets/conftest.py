@@ -7,6 +7,7 @@ SymPy derives them from Phi, where there are no tables; in space they are differ
 """
 
 import json
+import math
 import os
 import re
 import shutil
@@ -30,6 +31,7 @@ from kincompile.ir.lower import lower
 from kincompile.model.expressions import SMOOTH
 from kincompile.model.laws import RISES, MotionLaw
 from kincompile.model.spline import PeriodicSpline
+from kincompile.runtime.engine.code import code_of
 from tests.targets import golden_rows
 
 EXAMPLES = sorted((Path(__file__).resolve().parents[2] / "examples").glob("*.py"))
@@ -410,6 +412,73 @@ def loaded(**options: str) -> Callable[[dict[str, Case], Path], Results]:
     return run
 
 
+def in_library(take: Callable[[], Any], digits: int = 15) -> Any:
+    """Return the function that evaluates by `lanes`, on arrays or numbers of a library."""
+
+    def run(cases: dict[str, Case], folder: Path) -> Results:
+        del folder
+        xp = take()
+        with mpmath.workdps(digits), np.errstate(all="ignore"):
+            return {name: by_lanes(case, xp) for name, case in cases.items()}
+
+    return run
+
+
+def by_lanes(case: Case, xp: Any) -> dict[str, Any]:
+    """Return the quantities of all states: arrays in one go, numbers state by state."""
+    module, states = case.module, (case.q, case.q_dot, case.t[:, np.newaxis], case.p)
+    lanes = module.lanes(xp)
+    if not hasattr(xp, "asarray"):
+        exact = [np.vectorize(xp.mpf, otypes=[object])(part) for part in states]
+        rows = [kinematics(module, lanes, *(part[k] for part in exact)) for k in range(len(case.t))]
+        return {x: np.array([row[x][0] for row in rows]) for x in QUANTITIES}
+    return kinematics(module, lanes, *([xp.asarray(x) for x in part.T.copy()] for part in states))
+
+
+def kinematics(module: Any, lanes: Any, q: Any, q_dot: Any, t: Any, p: Any) -> dict[str, Any]:
+    """Return the quantities, of shape (N, ...), of the functions of `lanes`."""
+    m, n = len(module.EQUATIONS), len(module.COORDINATES)
+    values = {
+        "Phi": lanes["position"](q, t[0], p),
+        "nu": lanes["nu"](q, t[0], p),
+        "gamma": lanes["gamma"](q, q_dot, t[0], p),
+    }
+    whole = lanes["kinematics"](q, q_dot, t[0], p)
+    for name, own in values.items():  # kinematics is all of it once more
+        start = {"Phi": 0, "nu": len(whole) - 2 * m, "gamma": len(whole) - m}[name]
+        for a, b in zip(own, whole[start:], strict=False):
+            np.testing.assert_allclose(number(a), number(b), rtol=1e-12, atol=1e-12)
+    count = np.shape(t[0])[0] if np.shape(t[0]) else 1
+    columns = {x: [np.broadcast_to(number(v), count) for v in own] for x, own in values.items()}
+    varying = iter(columns["Phi"][m:])
+    Phi_q = np.zeros((count, m, n))
+    for i, j, constant in code_of(module).entries:
+        Phi_q[:, i, j] = next(varying) if constant is None else constant
+    columns["Phi"] = columns["Phi"][:m]
+    found = {name: np.stack(own, axis=-1).reshape(count, m) for name, own in columns.items()}
+    return {**found, "Phi_q": Phi_q}
+
+
+def number(value: Any) -> Any:
+    """Return a value in double precision; outside a domain mpmath has a complex one."""
+    return np.float64(math.nan if isinstance(value, mpmath.mpc) else value)
+
+
+def array_api_strict() -> Any:
+    """Return the library that has the array API standard and nothing else."""
+    import array_api_strict as xp
+
+    return xp
+
+
+def jax_numpy() -> Any:
+    """Return JAX in double precision."""
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    return jax.numpy
+
+
 def refusal(module: Any, function: str, vector: str, length: int, right: int) -> str:
     """Return what a module says of a vector of the wrong length."""
     del right
@@ -603,6 +672,9 @@ RUNNERS = {
     "numpy": loaded(form="inline"),
     "grouped": loaded(form="grouped"),
     "c": loaded(target="c"),
+    "array_api_strict": in_library(array_api_strict),
+    "jax": in_library(jax_numpy),
+    "mpmath": in_library(lambda: mpmath.mp, 40),
     "octave": in_octave,
     "rust": in_rust,
     "node": in_javascript(in_node),
@@ -618,11 +690,13 @@ NEEDED = {
 
 def marked(names: Any) -> list[Any]:
     """Return targets as parameters of a test; what runs in a browser is slow."""
-    marks = {"chromium": [pytest.mark.slow, pytest.mark.browser], "rust": [pytest.mark.slow]}
+    slow = pytest.mark.slow
+    marks = {"chromium": [slow, pytest.mark.browser], "rust": [slow], "jax": [slow]}
     return [pytest.param(name, marks=marks.get(name, [])) for name in names]
 
 
-MODULES = [name for name in RUNNERS if name not in ("interpreter", "octave", "rust")]
+LIBRARIES = ("array_api_strict", "jax", "mpmath")
+MODULES = [x for x in RUNNERS if x not in ("interpreter", "octave", "rust", *LIBRARIES)]
 """Targets whose file is a module, with constants, and checks of its arguments."""
 
 

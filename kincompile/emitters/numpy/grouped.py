@@ -299,7 +299,7 @@ def _data(
         ),
         "frames": indented(frames),
         "groups": indented(groups),
-        **support({*module.called, "where"}, has_large_blocks=True),
+        **support(program, {*module.called, "where"}, has_large_blocks=True),
     }
 
 

@@ -38,17 +38,19 @@ FUNCTIONS = {
     "asin": "np.arcsin", "acos": "np.arccos", "atan": "np.arctan", "atan2": "staticmethod(_atan2)",
     "asinh": "np.arcsinh", "acosh": "np.arccosh", "atanh": "np.arctanh",
     "pow": "np.power", "where": "np.where", "cos_sin": "staticmethod(_cos_sin)",
+    "spline": "staticmethod(spline)",
 }  # fmt: skip
 """NumPy's names of elementary functions where they are not those of `math`."""
 
 SCALAR_FUNCTIONS = {
     "where": "staticmethod(lambda condition, a, b: a if condition else b)",
     "cos_sin": "staticmethod(lambda angle, cos=math.cos, sin=math.sin: (cos(angle), sin(angle)))",
+    "spline": "staticmethod(spline)",
 }
 """Functions that `math` does not have."""
 
 RESERVED: tuple[str, ...] = (
-    "f", "q", "q_dot", "q_ddot", "t", "p", "np", "math", "nan", "pi", "spline", *FUNCTIONS,
+    "f", "q", "q_dot", "q_ddot", "t", "p", "np", "math", "nan", "pi", *FUNCTIONS,
     "sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt",
 )  # fmt: skip
 """Names that the code of the functions uses."""
@@ -81,6 +83,9 @@ def files(
         lines += ["", "", *solve_functions(code, solving)]
         keys += ["factor", "solve"]
     text = "\n".join(lines)
+    if plan is not None and plan.has_choices:
+        called = {*called, "where"}
+    large = {"has_large_blocks": plan is not None and plan.has_large_blocks}
     data = {
         **_constants(code),
         "kernels": text,
@@ -90,10 +95,8 @@ def files(
         "results": "\n".join(_results(code.program)),
         "lanes": f"dict{tuple_text(f'{name}=_{name}' for name in keys)}",
         "is_planned": plan is not None,
-        **support(
-            {*called, "where"} if plan is not None and plan.has_choices else called,
-            has_large_blocks=plan is not None and plan.has_large_blocks,
-        ),
+        **support(code.program, called, **large),
+        "portable": portable(code.program, called, **large),
     }
     return {f"{code.program.name}.py": fill("numpy/module.py.jinja", data)}
 
@@ -225,17 +228,32 @@ def public_functions(
             yield quantity, name, (f"def {name}({states}, t, p=DEFAULTS):", f'    """{text}"""')
 
 
-def support(called: Collection[str], *, has_large_blocks: bool) -> dict[str, str]:
-    """Return the parts that both forms of a module have in common, by slot."""
+def support(program: Program, called: Collection[str], *, has_large_blocks: bool) -> dict[str, str]:
+    """Return the parts that the forms of a module have in common, by slot."""
+    own = {*called, "spline"} if program.tables else called
     functions = {
-        "scalar_functions": _class_body(called, SCALAR_FUNCTIONS, "math"),
-        "array_functions": _class_body(called, FUNCTIONS, "np"),
+        "scalar_functions": _class_body(own, SCALAR_FUNCTIONS, "math"),
+        "array_functions": _class_body(own, FUNCTIONS, "np"),
+        "spline": fill("numpy/spline.py.jinja", {}).rstrip() if program.tables else "",
         "has_frames": "cos_sin" in called,
         "has_angles": "atan2" in called,
         "has_large_blocks": has_large_blocks,
     }
-    files = {"arguments": {}, "spline": {}, "elementary": functions}
+    files = {"arguments": {}, "elementary": functions}
     return {name: fill(f"numpy/{name}.py.jinja", data).rstrip() for name, data in files.items()}
+
+
+def portable(program: Program, called: Collection[str], *, has_large_blocks: bool) -> str:
+    """Return the functions of a module on other libraries."""
+    parts = {"cos_sin": ("cos", "sin"), "where": (), "pow": ()}
+    names = {name for given in called for name in parts.get(given, (given,))}
+    data = {
+        "called": called,
+        "names": tuple_text(f'"{name}"' for name in sorted(names)) if names else "",
+        "has_tables": bool(program.tables),
+        "has_large_blocks": has_large_blocks,
+    }
+    return fill("numpy/portable.py.jinja", data).rstrip()
 
 
 def _class_body(called: Iterable[str], own: Mapping[str, str], module: str) -> str:

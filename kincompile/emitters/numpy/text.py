@@ -23,6 +23,7 @@ NUMPY = Dialect(
     nan="nan",
     square=("{}**2", (ATOM,), POWER),
     select="where({}, {}, {})",
+    table="f.spline({}, {}, {})",
 )
 """How Python writes expressions; the module gives the names, for a point and for a batch."""
 

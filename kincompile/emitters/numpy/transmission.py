@@ -52,8 +52,8 @@ def files(of: Transmission) -> Mapping[str, str]:
     ]
     body = [*read, *function_body(of.of.code, listing, of.printer, "packed")]
     text = "\n".join(body)
-    parts = support(listing.functions, has_large_blocks=False)
-    splines = "\n".join(tables(of.of.code.program))
+    program = of.of.code.program
+    parts = support(program, listing.functions, has_large_blocks=False)
     constants = [f"_{x} = {n}" for x, n in of.sizes.items()]
     constants += [f"_{x} = {tuple_text(map(repr, own))}" for x, own in of.tables.items()]
     constants += [f"_{x} = {value!r}" for x, value in NUMBERS.items()]
@@ -65,8 +65,7 @@ def files(of: Transmission) -> Mapping[str, str]:
         "statuses": "\n".join(f"{x} = _{x} = {n}" for x, n in statuses().items()),
         "constants": "\n".join(constants),
         "of_math": [x for x in ("pi", "nan") if re.search(rf"\b{x}\b", text)],
-        "tables": splines,
-        "spline": parts["spline"] if splines else "",
+        "tables": "\n".join(tables(program)),
         "elementary": parts["elementary"].partition("\n\n\n")[2],
         "body": indented(body),
         "solver": _Solver(transmission()).text(),

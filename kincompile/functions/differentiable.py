@@ -1,0 +1,225 @@
+r"""`kc.jax`: a motion, or a transmission, as a function of JAX that can be differentiated.
+
+The code is the emitted module's own, on JAX's numbers. A position is sought along the straight
+way from the first one, in time and parameters, with the criteria of a march; its derivatives are
+those of the equations, not of the iterations:
+
+.. math:: \Phi_q \, dq = -(\Phi_t \, dt + \Phi_p \, dp)
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile import criteria
+from kincompile.errors import InputError, SolveError, UnsupportedError
+from kincompile.functions.transmission import Transmission
+from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.problem import problem
+from kincompile.runtime.solve import solve
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import ModuleType
+
+
+def jax(given: ModuleType | Transmission) -> Callable[..., Any]:
+    """Return the motion of a module as a function of JAX, or the outputs of a transmission.
+
+    ``f = kc.jax(module)`` is a function ``q, q_dot, q_ddot = f(t, p)`` of one time and of the
+    parameters (k,), by default those of the module; ``f = kc.jax(transmission)`` is ``x = f(u, p)``
+    of the inputs (m,) and of the parameters beside them. They can be given to ``jax.jit``,
+    ``vmap``, ``grad``, ``jvp``, ``vjp`` and ``jax.export``. For a batch use ``vmap``.
+
+    Parameters
+    ----------
+    given
+        What `compile` or `load` returned, or `transmission`.
+
+    Returns
+    -------
+    callable
+        Coordinates (n,) and their rates, or outputs (n,), in double precision. They are NaN where
+        the mechanism cannot be assembled on the branch of its first position, and beyond a
+        singular one: `solve` and `Transmission.at` say why.
+
+    Raises
+    ------
+    InputError
+        If JAX is not installed, or computes in single precision.
+    UnsupportedError
+        If the module has no planned solve, as in grouped form, or is of an earlier version.
+    StructuralError, SolveError
+        If the equations do not determine the coordinates, or cannot be assembled at time 0.
+    """
+    _double_precision()
+    if isinstance(given, Transmission):
+        return _outputs(given)
+    return _motion(given)
+
+
+def _double_precision() -> None:
+    """Check that JAX is there and has numbers of 64 bits."""
+    try:
+        import jax.numpy as jnp
+    except ImportError:
+        raise InputError("kc.jax needs JAX: install it with pip install jax.") from None
+    if jnp.zeros(()).dtype != np.float64:
+        raise InputError(
+            "JAX computes in single precision, in which no position converges. "
+            'Call jax.config.update("jax_enable_x64", True) first.'
+        )
+
+
+def _motion(module: ModuleType) -> Callable[..., Any]:
+    """Return the function of time and parameters."""
+    import jax.numpy as jnp
+    from jax import jit as jitted
+
+    first = solve(module, 0.0)
+    if not first.success:
+        raise SolveError(f"kc.jax starts from the position at time 0: {first.message}", first)
+    defaults = np.array(module.DEFAULTS)
+    position, linear, lanes = _positions(module, first.q[0], defaults)
+
+    def motion(t: Any, p: Any = defaults) -> tuple[Any, Any, Any]:
+        """Return q, q_dot and q_ddot (n,) at a time t and with parameters p (k,)."""
+        t, p = jnp.asarray(t, dtype=float), _vector(p, defaults, "p", module.PARAMETERS)
+        q = position(t, p)
+        factors = linear(q, t, p)[1]
+        q_dot = _array(lanes["solve"](factors, lanes["nu"](q, t, p)))
+        return q, q_dot, _array(lanes["solve"](factors, lanes["gamma"](q, q_dot, t, p)))
+
+    return jitted(motion)
+
+
+def _outputs(f: Transmission) -> Callable[..., Any]:
+    """Return the function of inputs and parameters."""
+    import jax.numpy as jnp
+    from jax import jit as jitted
+
+    module, home, inputs = f.module, f.home, len(f.inputs)
+    position, _, lanes = _positions(module, home.q, home.p)
+    count = len(home.p) - inputs - len(f.loop.rates)
+    others = np.zeros(len(f.loop.rates))
+    names = (*module.COORDINATES, *getattr(module, "OUTPUTS", ()))
+    places = np.array([names.index(name) for name in f.outputs])
+    is_twist = np.array([name in f.twists for name in f.outputs])
+
+    def outputs(u: Any, p: Any = home.p[:count]) -> Any:
+        """Return the outputs x (n,) at inputs u (m,) and with parameters p (k,)."""
+        given = _vector(p, home.p[:count], "p", module.PARAMETERS[:count])
+        whole = jnp.concatenate([given, others, _vector(u, home.u, "u", f.inputs)])
+        q = position(jnp.zeros(()), whole)
+        still = jnp.zeros_like(q)
+        y = lanes["observe"](q, still, still, jnp.zeros(()), whole) if "observe" in lanes else ()
+        columns = jnp.concatenate([q, _array(y[: len(names) - len(q)])])
+        return jnp.where(is_twist, jnp.nan, columns[places])
+
+    return jitted(outputs)
+
+
+def _vector(given: Any, like: Any, what: str, names: tuple[str, ...]) -> Any:
+    """Return a vector, checked."""
+    import jax.numpy as jnp
+
+    found = jnp.asarray(given, dtype=float)
+    if found.shape != like.shape:
+        raise InputError(
+            f"{what} has the shape {found.shape}: give {len(names)} numbers, "
+            f"{', '.join(names) or 'none'}. For a batch use jax.vmap."
+        )
+    return found
+
+
+def _array(values: Any) -> Any:
+    """Return numbers, some of them plain, as a vector."""
+    import jax.numpy as jnp
+
+    return jnp.stack([jnp.asarray(x, dtype=float) for x in values]) if values else jnp.zeros(0)
+
+
+def _positions(module: ModuleType, q_0: Any, p_0: Any) -> tuple[Any, Any, Any]:
+    """Return the position q(t, p) with its derivatives, what factors Phi_q, and the code."""
+    import jax
+    import jax.numpy as jnp
+
+    code, name = code_of(module), module.NAME
+    if code.lanes is None or not hasattr(module, "lanes"):
+        raise UnsupportedError(
+            f"{name} has no planned solve that runs on JAX: it is in grouped form, or was emitted "
+            "by an earlier version. Compile it again, with form='inline' if it is large."
+        )
+    lanes, m = module.lanes(jnp), module.N_EQUATIONS
+    scale = jnp.asarray(problem(code, p_0, q_0, 0.0).reference)
+
+    def equations(q: Any, t: Any, p: Any) -> Any:
+        return _array(lanes["position"](q, t, p)[:m])
+
+    def linear(q: Any, t: Any, p: Any) -> tuple[Any, Any, Any]:
+        """Return Phi, the factors of Phi_q, and the signs of the determinants of its blocks."""
+        values = lanes["position"](q, t, p)
+        factors, determinants = lanes["factor"](values[m:])
+        return values[:m], factors, jnp.sign(_array(determinants))
+
+    def solved(factors: Any, right: Any) -> Any:
+        return _array(lanes["solve"](factors, list(right)))
+
+    def size(vector: Any) -> Any:
+        return jnp.max(jnp.abs(vector / scale), initial=0.0)
+
+    def corrected(q: Any, t: Any, p: Any) -> tuple[Any, Any, Any]:
+        """Return the position near q, whether it converged, and the signs there."""
+
+        def correct(carry: Any) -> Any:
+            at, k, _, _ = carry
+            Phi, factors, own = linear(at, t, p)
+            change = solved(factors, Phi)
+            return at - change, k + 1, size(change), own
+
+        def goes_on(carry: Any) -> Any:
+            _, k, change, _ = carry
+            return (change > criteria.TOLERANCE) & (k < criteria.MAX_CORRECTIONS)
+
+        found, _, change, own = jax.lax.while_loop(goes_on, correct, (q, 0, jnp.inf, signs))
+        return found, change <= criteria.TOLERANCE, own
+
+    def along(t: Any, p: Any) -> Any:
+        """Return the position at the end of the straight way from the first one; NaN if none is."""
+
+        def at(s: Any) -> tuple[Any, Any]:
+            return s * t, p_0 + s * (p - p_0)
+
+        def step(carry: Any) -> Any:
+            s, h, q = carry
+            end = jnp.minimum(s + h, 1.0)
+            missed = jax.jvp(lambda s: equations(q, *at(s)), (s,), (end - s,))[1]
+            moved = -solved(linear(q, *at(s))[1], missed)
+            found, is_good, own = corrected(q + moved, *at(end))
+            error, movement = size(found - q - moved), size(moved)
+            is_good &= (movement <= 1.0) & jnp.all(own == signs)
+            is_good &= (error <= criteria.SMALL_ERROR) | (error <= criteria.ALLOWED_PART * movement)
+            s, q = jnp.where(is_good, end, s), jnp.where(is_good, found, q)
+            return s, jnp.where(is_good, 2 * h, h / 2), q
+
+        def goes_on(carry: Any) -> Any:
+            return (carry[0] < 1.0) & (carry[1] > criteria.SMALLEST_PART)
+
+        s, _, q = jax.lax.while_loop(goes_on, step, (0.0, 1.0, jnp.asarray(q_0)))
+        return jnp.where(s == 1.0, q, jnp.nan)
+
+    @jax.custom_jvp
+    def position(t: Any, p: Any) -> Any:
+        return along(t, p)
+
+    @position.defjvp
+    def _(primals: Any, tangents: Any) -> Any:
+        q = position(*primals)
+        _, missed = jax.jvp(partial(equations, q), primals, tangents)
+        return q, -solved(linear(q, *primals)[1], missed)
+
+    signs = linear(jnp.asarray(q_0), 0.0, jnp.asarray(p_0))[2]
+    return position, linear, lanes
