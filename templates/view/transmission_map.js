@@ -1,5 +1,5 @@
 'use strict';
-/* Which inputs can be reached, of one or two, and where singular positions are among them.
+/* Which inputs can be reached, of one or two, and where singular positions are among them; more inputs are held.
 
    Poses are found from neighbour to neighbour on a lattice of inputs that has the first pose as a point: all are on its branch. Where
    a way from one that was reached ends, the branch does, at an output singularity (type 2); where det J changes its sign there is an
@@ -12,9 +12,9 @@ const MOST_POSES = 6000;  // that are tried on a lattice
 const SLICE = 12;  // milliseconds that the search takes at a time
 
 class InputMap {
-  constructor(branch) {
+  constructor(branch, home) {
     this.branch = branch;
-    this.home = branch.home;
+    this.home = home;
     this.poses = [];  // all that were reached
     this.ways = new Map();  // and where ways ended
     this.curves = [];  // { type: 'input' or 'output', ends: poses }, for one input one pose each
@@ -37,7 +37,7 @@ class InputMap {
   }
 
   *work() {
-    const chords = this.branch.limits(this.home), isPlane = chords.length === 2;
+    const chords = this.branch.limits(this.home).slice(0, 2), isPlane = chords.length === 2;
     this.bounds = chords.map((ends, k) => this.boundsOf(ends, k, isPlane));
     const found = chords.map((ends, k) => ends.map((end, side) => end ?? this.bounds[k][side]));
     if (isPlane) {
@@ -62,11 +62,11 @@ class InputMap {
   }
 
   inputsAt(place) {
-    return place.map((count, k) => this.home.u[k] + count * this.steps[k]);
+    return this.home.u.map((x, k) => (k < place.length ? x + place[k] * this.steps[k] : x));
   }
 
   isWithin(u) {
-    return u.every((x, k) => x >= this.bounds[k][0] - 1e-9 * this.steps[k] && x <= this.bounds[k][1] + 1e-9 * this.steps[k]);
+    return this.bounds.every(([low, high], k) => u[k] >= low - 1e-9 * this.steps[k] && u[k] <= high + 1e-9 * this.steps[k]);
   }
 
   /* Reach what can be reached from the first pose, from neighbour to neighbour. */
@@ -168,7 +168,7 @@ class InputMap {
 
   /* The pose that is nearest to inputs, in steps of the lattice. */
   near(u) {
-    const apart = pose => Math.hypot(...pose.u.map((x, k) => (x - u[k]) / this.steps[k]));
+    const apart = pose => Math.hypot(...this.steps.map((step, k) => (pose.u[k] - u[k]) / step));
     return this.poses.reduce((best, pose) => (apart(pose) < apart(best) ? pose : best), this.home);
   }
 }

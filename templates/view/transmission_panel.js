@@ -3,6 +3,7 @@
    singular positions in it. The drawing shows the pose of the inputs while the panel is open and time rests. */
 
 const CHART = { width: 340, height: 250, left: 46, right: 10, top: 10, low: 36 };
+const MOST_MAPPED = 3;  // inputs that have a map: of three a slice, the last one held
 const SCARCE = 40;  // units of it between ticks, about
 
 // What changes its height is below the sliders and the map, so that neither moves while it is dragged.
@@ -52,7 +53,7 @@ const transmission = {
     }
     panel.classList.add('transmission');
     panel.innerHTML = TRANSMISSION_MARKUP;
-    this.part('.where').hidden = ends.inputs.length > 2;
+    this.part('.where').hidden = ends.inputs.length > MOST_MAPPED;
     this.begin();
     byId('first-pose').addEventListener('click', () => this.first());
     this.listen();
@@ -86,8 +87,18 @@ const transmission = {
       return [low ?? home.u[k] - far, high ?? home.u[k] + far];
     }));
     this.find();
-    if (inputs.length > 2 || !this.pose) return;
-    const search = new InputMap(this.branch);
+    this.look();
+  },
+
+  /* Search the axis or the plane of the first inputs; a third one is held as it is. */
+  look() {
+    this.search?.stop();
+    const { branch, u } = this, { home } = branch;
+    if (u.length > MOST_MAPPED || !isReached(home)) return;
+    const here = u.length < 3 ? home : branch.go(home, [...home.u.slice(0, 2), u[2]]);
+    this.held = u[2];
+    if (!isReached(here) && this.pose?.u[2] !== u[2]) return;
+    const search = new InputMap(branch, isReached(here) ? here : this.pose);
     this.search = search;
     search.search(() => this.take(search));
   },
@@ -102,13 +113,16 @@ const transmission = {
 
   /* Show a map that was searched for; the drawing has room for all its poses. */
   take(map) {
+    const isFirst = !this.map;
     this.map = map;
     this.span(map.box);
     const areas = map.areas.flat();
     if (map.box.length === 1) map.box = [[areas[0].u[0], areas[areas.length - 1].u[0]]];
-    player.more = map.poses.map(({ all }) => ({ q: all, isFound: true }));
-    live.fit();
-    if (isSpatial) orbit.forget();
+    if (isFirst) {
+      player.more = map.poses.map(({ all }) => ({ q: all, isFound: true }));
+      live.fit();
+      if (isSpatial) orbit.forget();
+    }
     this.find();
     player.refresh();
   },
@@ -121,6 +135,7 @@ const transmission = {
       this.frame = null;
       player.pause();
       this.find();
+      if (u[2] !== this.held) this.look();
       this.show();
     });
   },
@@ -295,7 +310,7 @@ const transmission = {
   },
 
   get isPlane() {
-    return player.data.transmission.inputs.length === 2;
+    return player.data.transmission.inputs.length > 1;
   },
 
   count(type) {
@@ -325,11 +340,13 @@ const transmission = {
       write(units.titled(inputs[0].name, inputs[0].unit), (left + width - right) / 2, height - 5, 'middle', { class: 'title' }),
       write(units.titled(second.name, second.unit), -(top + height - low) / 2, 11, 'middle', { class: 'title', transform: 'rotate(-90)' }),
     ];
+    const held = inputs.slice(2, MOST_MAPPED).map(({ name, unit }) => write(
+      `${name} = ${shortNumber(map.home.u[2] * units.factor(unit))} ${units.name(unit)}`, width - right - 4, top + 12, 'end', { class: 'title' }));
     const curves = type => map.curves.filter(curve => curve.type === type).map(({ ends }) => ends);
     const drawn = this.isPlane
       ? [path('area', map.areas, 'Z'), path('output', curves('output')), path('input', curves('input'))]
       : [path('line', map.areas), ...['output', 'input'].flatMap(type => curves(type).map(([pose]) => this.mark(type, at(pose))))];
-    return [frame, ...drawn, ...scaleX, ...scaleY, ...titles];
+    return [frame, ...drawn, ...scaleX, ...scaleY, ...titles, ...held];
   },
 
   /* A singular position of a single input: a line across the axis, and what tells the types apart without colours. */
@@ -359,7 +376,7 @@ const transmission = {
       if (!this.map || !(event.buttons & 1)) return;
       const box = svg.getBoundingClientRect(), scale = CHART.width / box.width;
       const u = this.axes.inputs([(event.clientX - box.left) * scale, (event.clientY - box.top) * scale]);
-      this.set(u.map(x => +x.toPrecision(6)));
+      this.set([...u.map(x => +x.toPrecision(6)), ...this.u.slice(u.length)]);
       event.preventDefault();
     };
     svg.addEventListener('pointerdown', event => {

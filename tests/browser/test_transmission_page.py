@@ -26,12 +26,28 @@ def lever() -> kc.Mechanism:
     return models.crank_rocker(*lengths, psi=0.99, motor=1.0)
 
 
+def three_motors() -> kc.Mechanism:
+    """Return a platform that three arms with rods hold in the plane."""
+    m = kc.Mechanism("three_motors")
+    platform = m.body("platform", (0, 0, 0))
+    for k, turn in enumerate((0, 2 * math.pi / 3, 4 * math.pi / 3), start=1):
+        out = np.array([math.cos(turn), math.sin(turn)])
+        value = turn + math.pi + 0.695  # at the triangle of arm, rod and the way between their ends
+        arm = m.body(f"arm_{k}", (*(0.2 * out), value))
+        m.add(kc.Revolute(f"hinge_{k}", m.ground, 0.2 * out, arm, (0, 0)))
+        m.add(kc.Distance(f"rod_{k}", arm, (0.1, 0), platform, 0.06 * out, 0.09))
+        m.add(kc.AbsoluteAngle(f"motor_{k}", arm, value))
+    return m
+
+
+MOTORS = ["motor_1", "motor_2", "motor_3"]
 CASES = {
     "crank_rocker": (models.crank_rocker, ["motor"], ["phi_rocker"]),
     "free_crank": (lambda: models.crank_rocker(motor=None), ["crank.phi"], ["rocker.phi"]),
     "lever": (lever, ["motor"], ["phi_rocker"]),
     "five_bar": (models.five_bar, ["motor_1", "motor_2"], ["end"]),
     "ankle": (models.ankle, ["left", "right"], ["pitch", "roll"]),
+    "three": (three_motors, MOTORS, ["platform.x", "platform.y", "platform.phi"]),
 }
 SEEN = "stage.canvas.toDataURL()"
 SET = """u => new Promise(done => { transmission.set(u);
@@ -70,6 +86,7 @@ def poses_of(case: str) -> list[list[float]]:
         "lever": [[0.5], [2.1]],
         "five_bar": [[2.2, 1.0], [1.2, 1.5], [0.4, 2.6]],
         "ankle": [[0.21, 0.235], [0.25, 0.24], [0.2, 0.195]],
+        "three": [[4.0, 5.7, 8.1], [3.7, 6.1, 7.9]],
     }[case]
 
 
@@ -151,6 +168,37 @@ def curves(page: Any, kind: str) -> list[Any]:
         kind,
     )
     return found
+
+
+def test_that_three_inputs_have_a_slice_in_which_the_third_is_held(
+    open_case: Callable[..., Any],
+) -> None:
+    """Its poses are those of Python with this value, and det J is zero along its curves."""
+    page, f = open_case("three"), function_of("three")
+    slices = []
+    for third in (f.home.u[2], f.home.u[2] + 0.3):
+        page.evaluate(SET, [*f.home.u[:2], third])
+        page.wait_for_function("third => transmission.map.home.u[2] === third", arg=third)
+        poses = page.evaluate("transmission.map.poses.map(({ u, x }) => [...u, ...x])")
+        assert len(poses) > 200
+        some = np.array(poses)[:: len(poses) // 40]
+        assert (some[:, 2] == third).all()
+        reached = f.at(some[:, :3])
+        assert (reached.status == 0).mean() > 0.9  # the rest lies behind a corner
+        known = reached.status == 0
+        np.testing.assert_allclose(reached.x[known], some[known, 3:], rtol=0, atol=1e-9)
+        ends = [end for curve in curves(page, "input") for end in curve]
+        zeros = f.at(np.array([u for u, _ in ends]))
+        same = np.abs(zeros.q - [q for _, q in ends]).max(axis=1) < 1e-8
+        assert same.sum() > 10
+        assert same.mean() > 0.9
+        slopes = np.abs(zeros.determinant) / np.linalg.norm(zeros.J, axis=(1, 2)) ** 3
+        assert slopes[same].max() < 1e-9
+        written = page.locator(".map text").all_text_contents()
+        assert any(text.startswith(f"motor_3 = {third:.6g}") for text in written), written
+        slices.append(some)
+    assert slices[0].shape != slices[1].shape or not np.allclose(slices[0], slices[1])
+    page.close()
 
 
 def test_that_dead_points_of_a_crank_rocker_are_where_the_closed_form_has_them(
