@@ -156,7 +156,7 @@ def transmission_files(
     """
     from kincompile.emitters.transmission_emission import emit_transmission, require_transmission
     from kincompile.ir.transmission import transmission_code
-    from kincompile.transmissions.legs import without_legs
+    from kincompile.transmissions.legs import lengths_of, without_legs
     from kincompile.transmissions.loop import loop_of
 
     require_transmission(target)
@@ -173,7 +173,8 @@ def transmission_files(
     code = _lowered(smaller, "inline")
     assert isinstance(code, InlineProgram)
     further.require_small(code.program, "transmissions", "take")
-    found = transmission_code(code, names, wanted, q.tolist())
+    lengths = lengths_of(smaller, set(names))
+    found = transmission_code(code, names, wanted, q.tolist(), lengths)
     defaults = {x.name: float(x.default or 0.0) for x in code.program.parameters}
     first = [q[k] for k in found.free], [defaults[name] for name in names]
     return emit_transmission(target, found, *first), found

@@ -17,6 +17,7 @@ from kincompile.criteria import AGREEMENT, SOLVED
 from kincompile.errors import StructuralError
 from kincompile.ir.differentiate import tangents
 from kincompile.ir.elimination import plan_solve, sizes_of
+from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph, depending_on, pruned, reachable
 from kincompile.ir.inline import inline
 from kincompile.ir.looks import root_of
@@ -28,6 +29,8 @@ from kincompile.quantities import turning
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    import sympy
 
     from kincompile.ir.elimination import SolvePlan
     from kincompile.ir.inline import InlineProgram
@@ -49,8 +52,9 @@ class TransmissionCode:
     places
         Of each output the vector that it is in: ``change`` by which q misses, in coordinates;
         ``slopes``, those of q by the inputs, row by row; ``x``; ``J``, row by row; the
-        ``determinants`` of the blocks; ``missed``, the part of its terms by which an equation is
-        missed, of those eliminated in a fixed order and those that repeat others.
+        ``determinants`` of the blocks, and lengths that keep their signs as well; ``missed``, the
+        part of its terms by which an equation is missed, of those eliminated in a fixed order and
+        those that repeat others.
     inputs
         Names of the parameters that are inputs.
     titles, outputs
@@ -94,13 +98,18 @@ class TransmissionCode:
 
 
 def transmission_code(
-    code: InlineProgram, inputs: Mapping[str, str], outputs: Sequence[str], near: Sequence[float]
+    code: InlineProgram,
+    inputs: Mapping[str, str],
+    outputs: Sequence[str],
+    near: Sequence[float],
+    lengths: Sequence[sympy.Expr] = (),
 ) -> TransmissionCode:
     """Return the code of a mechanism as a function from parameters to coordinates and outputs.
 
     The inputs are the names of parameters, and what they are called; `near` is a position at
     their defaults. Nothing depends on time. An output that is linear in velocities has a Jacobian
-    and no value, which is NaN.
+    and no value, which is NaN. `lengths` of the inputs keep their signs as determinants do: an
+    equation has their squares, and is the same on the other side of zero.
 
     Raises
     ------
@@ -144,7 +153,10 @@ def transmission_code(
         "slopes": [node for own in zip(*slopes, strict=True) for node in own],
         "x": [made.nan() if a in moving else made.sub(a, b) for a, b in zip(x, moved, strict=True)],
         "J": [node for own in zip(*along, strict=True) for node in own],
-        "determinants": _determinants(made, solve.determinants, plan),
+        "determinants": [
+            *_determinants(made, solve.determinants, plan),
+            *map(Converter(made, made.input).convert, lengths),
+        ],
         "missed": [_missed(code, made, solve, [new[x] for x in rows], sizes.entries)],
     }
     places = [(name, k) for name, nodes in vectors.items() for k in range(len(nodes))]

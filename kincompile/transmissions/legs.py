@@ -5,7 +5,8 @@ mechanism in two points. Where its inside is rigid for given inputs, all that it
 is a distance of these two: its equations inside do not change as it moves as a whole. So its bodies
 and their equations are left out, and the rest has fewer unknowns. The distance is read off the
 leg's own equations, with its first body in the place of the ground: they are linear in where the
-others are.
+others are. A leg stays whose own joints do not take it to every direction, as a universal joint
+does not whose axis is oblique to the leg.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 import sympy
 
 from kincompile.calculus.expand import Expansion
-from kincompile.model.expressions import as_sympy, evaluate
+from kincompile.model.expressions import as_sympy, evaluate, symbol_names
 from kincompile.model.points import PlacedPoint
 from kincompile.model.relative import Distance as PlanarDistance
 from kincompile.model.resolve import Joint
@@ -26,7 +27,7 @@ from kincompile.model.symbolic import SymbolicEnvironment
 from kincompile.space.primitives import Distance
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -41,6 +42,10 @@ if TYPE_CHECKING:
 
 TOUCHING = ("Revolute", "Spherical", "Universal")
 """Joints in which two points coincide, by their first rows."""
+FREE = ("Revolute", "Spherical", "Normalization")
+"""Constraints of a leg, one with its end, that leave it every direction."""
+HOLDING = {"Universal": "h", "Dot1": "a"}
+"""Constraints that keep two directions at a right angle, and the symbol of these."""
 NOISE = 1e-9
 """Rounding errors of the position, in numbers of size one."""
 
@@ -72,6 +77,19 @@ def without_legs(
         leg, rod = found
         rest = [x for x in system.constraints if not leg.touches(x)]
         system = system.rewritten(rest, [rod]).without(leg.names, seen)
+
+
+def lengths_of(system: ConstraintSystem, inputs: Collection[str]) -> list[sympy.Expr]:
+    """Return the distances between points that depend on inputs, parameters of the system.
+
+    Where one passes through zero the points meet, and a rod that ends there may point anywhere.
+    """
+    found = (
+        as_sympy(x.scalars["C"])
+        for x in system.constraints
+        if isinstance(x, Joint) and x.type_name == "Distance"
+    )
+    return [x for x in found if not symbol_names(x).isdisjoint(inputs)]
 
 
 def _is_plain(item: Any) -> bool:
@@ -167,8 +185,10 @@ class _Leg:
         if one is other or places is None or not self._may_spin(inside, ends):
             return None
         points = [self._point(places, *self._end(x, is_own=True)) for x in ends]
-        length = self._length([a - b for a, b in zip(*points, strict=True)])
-        if length is None:
+        apart = [a - b for a, b in zip(*points, strict=True)]
+        others = [x for x in touched if x not in inside and x.type_name not in FREE]
+        length = self._length(apart)
+        if length is None or not all(self._gives_way(x, places, apart) for x in others):
             return None
         kind = PlanarDistance if self.size == 2 else Distance
         return kind(ends[0].name, one, first, other, second, length)
@@ -215,8 +235,23 @@ class _Leg:
         vector = a[0] * b[1:] - b[0] * a[1:] - np.cross(a[1:], b[1:])
         return [float(a @ b), *vector.tolist()]
 
+    def _gives_way(self, item: Any, places: Values, apart: Sequence[sympy.Expr]) -> bool:
+        """Return whether a spin of the leg meets a constraint whichever way the leg points.
+
+        One at a right angle does where the leg's own direction is across the leg.
+        """
+        symbol = HOLDING.get(item.type_name)
+        if symbol is None or item.scalars.get("C", 0) != 0:
+            return False
+        body, side = next(x for x in zip(item.bodies, "ij", strict=True) if x[0] in self.bodies)
+        own = tuple(map(as_sympy, item.points[f"{symbol}_{side}"]))
+        ends = (self._point(places, body, x) for x in (own, (sympy.Integer(0),) * self.size))
+        parts = zip(*ends, apart, strict=True)
+        along = sympy.expand(sympy.Add(*((tip - root) * part for tip, root, part in parts)))
+        return all(abs(evaluate(x, {})) <= NOISE for x in along.as_coefficients_dict().values())
+
     def _may_spin(self, inside: Sequence[Joint], ends: Sequence[Joint]) -> bool:
-        """Return whether nothing turns inside, or one of the points is on the axis."""
+        """Return whether nothing turns inside, or both points are on the axis."""
         if self.size == 2 or _rows(inside) == 6 * (len(self.bodies) - 1):
             return True
         axes = [x for x in inside if "h_j" in x.points]
@@ -226,9 +261,9 @@ class _Leg:
         for body, point in (self._end(x, is_own=True) for x in ends):
             at, along = (axes[0].points[f"{x}_{side[body.name]}"] for x in "sh")
             apart = [as_sympy(a) - as_sympy(b) for a, b in zip(point, at, strict=True)]
-            if _is_along(apart, list(map(as_sympy, along))):
-                return True
-        return False
+            if not _is_along(apart, list(map(as_sympy, along))):
+                return False
+        return True
 
     def _point(self, places: Values, body: Body, point: Place) -> list[sympy.Expr]:
         """Return the components of a point of a body in the frame of the first one."""

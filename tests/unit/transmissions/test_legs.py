@@ -64,7 +64,7 @@ def ankle(joint, end=spatial.Spherical, *, along=(0, 0, -1), off=0.0, beyond=0.0
         cylinder, rod = m.body(f"cylinder_{name}", top), m.body(f"rod_{name}", ball)
         given = m.ground, top, (0, 1, 0), cylinder, hung * aside, aside
         m.add(spatial.Universal(f"top_{name}", *given))
-        to = off * aside - beyond * np.array(along)
+        to = off * np.cross(along, aside) - beyond * np.array(along)
         if end is spatial.Universal:
             m.add(end(f"ball_{name}", foot, ball, (1, 0, 0), rod, to, (0, 1, 0)))
         else:
@@ -119,23 +119,62 @@ def test_lengths_stay_parameters():
     np.testing.assert_allclose(slopes, other["J"], rtol=1e-10)
 
 
-def test_a_cylinder_in_the_plane_is_the_law_of_cosines():
+def lift(base=0.4, offset=0.1):
+    """Return an arm and a cylinder in the plane, whose rod goes on by an offset."""
     m = kc.Mechanism("lift")
-    offset = m.parameter("offset", 0.1, "m")
-    places = ("arm", (0, 0, 1.0)), ("cylinder", (0.4, 0, 2.2)), ("rod", (0.3, 0.2, 2.2))
+    length = m.parameter("offset", offset, "m")
+    places = ("arm", (0, 0, 1.0)), ("cylinder", (base, 0, 2.2)), ("rod", (0.3, 0.2, 2.2))
     arm, cylinder, rod = (m.body(*x) for x in places)
     m.add(kc.Revolute("O", m.ground, (0, 0), arm, (0, 0)))
-    m.add(kc.Revolute("A", m.ground, (0.4, 0), cylinder, (0, 0)))
+    m.add(kc.Revolute("A", m.ground, (base, 0), cylinder, (0, 0)))
     slide = cylinder, (0, 0), (1, 0), rod, (0, 0)
     m.add(kc.Translational("slide", *slide, (1, 0)))
     m.add(kc.TranslationalDistance("stroke", *slide, 0.2))
-    m.add(kc.Revolute("B", arm, (0.3, 0), rod, (offset, 0)))
+    m.add(kc.Revolute("B", arm, (0.3, 0), rod, (length, 0)))
+    return m
+
+
+def test_a_cylinder_in_the_plane_is_the_law_of_cosines():
+    m = lift()
     module = emitted(m, (["stroke"], ["phi_arm"]))
     assert module["COORDINATES"] == ("phi_arm",)
     strokes = np.linspace(0.1, 0.5, 9)
     for stroke, (x, _) in zip(strokes, poses(module, strokes[:, np.newaxis]), strict=True):
         cosine = (0.3**2 + 0.4**2 - (stroke + 0.1) ** 2) / (2 * 0.3 * 0.4)
         assert abs(x[0] - math.acos(cosine)) < 1e-12
+
+
+def test_a_stroke_does_not_pass_through_zero_to_another_assembly():
+    """The square of a stroke is that of the negative one; its points meet in between."""
+    m = lift(base=0.3, offset=0.0)
+    strokes = np.array([[0.2], [0.15], [0.12], [0.01], [0.0], [-0.01], [-0.15]])
+    module = emitted(m, (["stroke"], ["phi_arm"]))
+    assert module["COORDINATES"] == ("phi_arm",)
+    state, _ = module["start"]()
+    statuses = [module["transmission"](state, u)[2] for u in strokes]
+    assert statuses == [0, 0, 0, 0, 2, 2, 2]
+    state, _ = module["start"]()
+    assert module["transmission_batch"](state, strokes)[2].tolist() == statuses
+
+
+def sideways(angle):
+    """Return a slider-crank in space: its rod ends in a cross, turned by an angle to the rod."""
+    m, z = spatial.Mechanism("sideways"), (0, 0, 1)
+    arm, block, rod = (m.body(name, (x, 0, 0)) for name, x in (("a", 0), ("b", 1.0), ("c", 0.3)))
+    m.add(spatial.Revolute("O", m.ground, AT, z, arm, AT, z))
+    m.add(spatial.Translational("S", m.ground, AT, (1, 0, 0), (0, 1, 0), block, AT, (1, 0, 0), z))
+    m.add(spatial.Spherical("B", arm, (0.3, 0, 0), rod, AT))
+    own = math.cos(angle), math.sin(angle), 0
+    m.add(spatial.Universal("C", block, (0, 0, 0.1), z, rod, (0.8, 0, 0), own))
+    return m
+
+
+def test_a_rod_that_its_cross_does_not_let_turn_to_every_side_stays():
+    """A cross whose axis is oblique to the rod ends its way; one across it does not."""
+    ends = ["e3_a"], ["b.x"]
+    assert "e0_c" not in emitted(sideways(math.pi / 2), ends)["COORDINATES"]
+    oblique = sideways(1.2)
+    assert "e0_c" in emitted(oblique, ends)["COORDINATES"]
 
 
 @pytest.mark.slow
