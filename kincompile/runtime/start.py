@@ -285,15 +285,24 @@ def turned_guess(equations: Problem, way: Sequence[Point]) -> Array | None:
 def turned_guesses(equations: Problem, engine: Planned, guesses: Array, t: float) -> Array:
     """Do so with each of a batch of guesses (n, N), where the equations miss less then."""
 
-    def missed(q: Array) -> Any:
+    def weighted(q: Array) -> Array:
         Phi = stacked(engine.evaluate(q, t).Phi, q.shape[1])
-        return np.linalg.norm(equations.weights()[:, np.newaxis] * Phi, axis=0)
+        return np.asarray(equations.weights()[:, np.newaxis] * Phi)
+
+    def missed(q: Array) -> Any:
+        return np.linalg.norm(weighted(q), axis=0)
 
     q, here = guesses.copy(), engine.evaluate(guesses, t)
     change = stacked(engine.solve(here, here.Phi), q.shape[1])
     turns = np.round(np.where(np.isfinite(change), -change, 0.0) / math.tau)
     turns[~equations.angular] = 0.0
-    columns, least = np.flatnonzero(turns.any(axis=1)), missed(q)
+    begin = weighted(q)
+    for column in np.flatnonzero(turns.any(axis=1)):
+        other = q.copy()
+        other[column] += math.tau
+        is_bound = np.linalg.norm(weighted(other) - begin, axis=0) > criteria.SAME_POSITION
+        turns[column, ~is_bound] = 0.0
+    columns, least = np.flatnonzero(turns.any(axis=1)), np.linalg.norm(begin, axis=0)
     for some in (columns, *columns[: criteria.MOST_TURNED, np.newaxis]):
         other = q.copy()
         other[some] += math.tau * turns[some]

@@ -1,5 +1,6 @@
 """A loop as a function: balance of energy, batches, branches, parameters, bad input."""
 
+import math
 import warnings
 
 import mpmath
@@ -298,3 +299,12 @@ def test_that_what_cannot_be_assembled_at_first_is_said():
         kc.transmission(
             models.crank_rocker(0.06, 0.3, 0.05, 0.305, motor=3.0), "motor", "rocker.phi"
         )
+
+
+def test_angles_are_not_wound_up_where_another_turn_of_the_crank_is_given():
+    """A double rocker cannot follow its crank to the next turn, where it stands as in this one."""
+    m = models.crank_rocker(0.09, 0.05, 0.08, 0.13, motor=1.2)
+    f = kc.transmission(m, ["motor"], ["phi_rocker"])
+    crank = np.linspace(-1.1, 1.1, 12)[:, np.newaxis]
+    for turn in (math.tau, -math.tau):
+        np.testing.assert_allclose(f(crank + turn), f(crank), rtol=0, atol=1e-9)
