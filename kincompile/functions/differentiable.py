@@ -1,7 +1,7 @@
 r"""`kc.jax`: a motion, or a transmission, as a function of JAX that can be differentiated.
 
 The code is the emitted module's own, on JAX's numbers. A position is sought along the straight
-way from the first one, in time and parameters, with the criteria of a march; its derivatives are
+way from a known one, in time and parameters, with the criteria of a march; its derivatives are
 those of the equations, not of the iterations:
 
 .. math:: \Phi_q \, dq = -(\Phi_t \, dt + \Phi_p \, dp)
@@ -25,8 +25,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from types import ModuleType
 
+    from numpy.typing import ArrayLike
 
-def jax(given: ModuleType | Transmission) -> Callable[..., Any]:
+
+def jax(given: ModuleType | Transmission, times: ArrayLike = 0.0) -> Callable[..., Any]:
     """Return the motion of a module as a function of JAX, or the outputs of a transmission.
 
     ``f = kc.jax(module)`` is a function ``q, q_dot, q_ddot = f(t, p)`` of one time and of the
@@ -38,6 +40,9 @@ def jax(given: ModuleType | Transmission) -> Callable[..., Any]:
     ----------
     given
         What `compile` or `load` returned, or `transmission`.
+    times : array_like, optional
+        Of a motion, times from which positions are sought: those at the nearest one begins. A
+        motion over many turns is faster with some times in each, as for `solve`.
 
     Returns
     -------
@@ -53,12 +58,12 @@ def jax(given: ModuleType | Transmission) -> Callable[..., Any]:
     UnsupportedError
         If the module has no planned solve, as in grouped form, or is of an earlier version.
     StructuralError, SolveError
-        If the equations do not determine the coordinates, or cannot be assembled at time 0.
+        If the equations do not determine the coordinates, or cannot be assembled at `times`.
     """
     _double_precision()
     if isinstance(given, Transmission):
         return _outputs(given)
-    return _motion(given)
+    return _motion(given, times)
 
 
 def _double_precision() -> None:
@@ -74,16 +79,16 @@ def _double_precision() -> None:
         )
 
 
-def _motion(module: ModuleType) -> Callable[..., Any]:
+def _motion(module: ModuleType, times: ArrayLike) -> Callable[..., Any]:
     """Return the function of time and parameters."""
     import jax.numpy as jnp
     from jax import jit as jitted
 
-    first = solve(module, 0.0)
+    first = solve(module, times)
     if not first.success:
-        raise SolveError(f"kc.jax starts from the position at time 0: {first.message}", first)
+        raise SolveError(f"kc.jax starts from the positions at `times`: {first.message}", first)
     defaults = np.array(module.DEFAULTS)
-    position, linear, lanes = _positions(module, first.q[0], defaults)
+    position, linear, lanes = _positions(module, first.t, first.q, defaults)
 
     def motion(t: Any, p: Any = defaults) -> tuple[Any, Any, Any]:
         """Return q, q_dot and q_ddot (n,) at a time t and with parameters p (k,)."""
@@ -102,7 +107,7 @@ def _outputs(f: Transmission) -> Callable[..., Any]:
     from jax import jit as jitted
 
     module, home, inputs = f.module, f.home, len(f.inputs)
-    position, _, lanes = _positions(module, home.q, home.p)
+    position, _, lanes = _positions(module, np.zeros(1), home.q[None], home.p)
     count = len(home.p) - inputs - len(f.loop.rates)
     others = np.zeros(len(f.loop.rates))
     names = (*module.COORDINATES, *getattr(module, "OUTPUTS", ()))
@@ -142,7 +147,7 @@ def _array(values: Any) -> Any:
     return jnp.stack([jnp.asarray(x, dtype=float) for x in values]) if values else jnp.zeros(0)
 
 
-def _positions(module: ModuleType, q_0: Any, p_0: Any) -> tuple[Any, Any, Any]:
+def _positions(module: ModuleType, t_0: Any, q_0: Any, p_0: Any) -> tuple[Any, Any, Any]:
     """Return the position q(t, p) with its derivatives, what factors Phi_q, and the code."""
     import jax
     import jax.numpy as jnp
@@ -154,7 +159,7 @@ def _positions(module: ModuleType, q_0: Any, p_0: Any) -> tuple[Any, Any, Any]:
             "by an earlier version. Compile it again, with form='inline' if it is large."
         )
     lanes, m = module.lanes(jnp), module.N_EQUATIONS
-    scale = jnp.asarray(problem(code, p_0, q_0, 0.0).reference)
+    scale = jnp.asarray(problem(code, p_0, q_0[0], float(t_0[0])).reference)
 
     def equations(q: Any, t: Any, p: Any) -> Any:
         return _array(lanes["position"](q, t, p)[:m])
@@ -184,14 +189,16 @@ def _positions(module: ModuleType, q_0: Any, p_0: Any) -> tuple[Any, Any, Any]:
             _, k, change, _ = carry
             return (change > criteria.TOLERANCE) & (k < criteria.MAX_CORRECTIONS)
 
-        found, _, change, own = jax.lax.while_loop(goes_on, correct, (q, 0, jnp.inf, signs))
+        found, _, change, own = jax.lax.while_loop(goes_on, correct, (q, 0, jnp.inf, signs[0]))
         return found, change <= criteria.TOLERANCE, own
 
     def along(t: Any, p: Any) -> Any:
-        """Return the position at the end of the straight way from the first one; NaN if none is."""
+        """Return the position at the end of a straight way from a known one, or NaN."""
+        nearest = jnp.argmin(jnp.abs(t - begin))
+        begun, kept = begin[nearest], signs[nearest]
 
         def at(s: Any) -> tuple[Any, Any]:
-            return s * t, p_0 + s * (p - p_0)
+            return begun + s * (t - begun), p_0 + s * (p - p_0)
 
         def step(carry: Any) -> Any:
             s, h, q = carry
@@ -200,7 +207,7 @@ def _positions(module: ModuleType, q_0: Any, p_0: Any) -> tuple[Any, Any, Any]:
             moved = -solved(linear(q, *at(s))[1], missed)
             found, is_good, own = corrected(q + moved, *at(end))
             error, movement = size(found - q - moved), size(moved)
-            is_good &= (movement <= 1.0) & jnp.all(own == signs)
+            is_good &= (movement <= 1.0) & jnp.all(own == kept)
             is_good &= (error <= criteria.SMALL_ERROR) | (error <= criteria.ALLOWED_PART * movement)
             s, q = jnp.where(is_good, end, s), jnp.where(is_good, found, q)
             return s, jnp.where(is_good, 2 * h, h / 2), q
@@ -208,7 +215,7 @@ def _positions(module: ModuleType, q_0: Any, p_0: Any) -> tuple[Any, Any, Any]:
         def goes_on(carry: Any) -> Any:
             return (carry[0] < 1.0) & (carry[1] > criteria.SMALLEST_PART)
 
-        s, _, q = jax.lax.while_loop(goes_on, step, (0.0, 1.0, jnp.asarray(q_0)))
+        s, _, q = jax.lax.while_loop(goes_on, step, (0.0, 1.0, known[nearest]))
         return jnp.where(s == 1.0, q, jnp.nan)
 
     @jax.custom_jvp
@@ -221,5 +228,6 @@ def _positions(module: ModuleType, q_0: Any, p_0: Any) -> tuple[Any, Any, Any]:
         _, missed = jax.jvp(partial(equations, q), primals, tangents)
         return q, -solved(linear(q, *primals)[1], missed)
 
-    signs = linear(jnp.asarray(q_0), 0.0, jnp.asarray(p_0))[2]
+    begin, known = jnp.asarray(t_0), jnp.asarray(q_0)
+    signs = jax.vmap(lambda q, t: linear(q, t, jnp.asarray(p_0))[2])(known, begin)
     return position, linear, lanes
