@@ -248,7 +248,7 @@ class _Leg:
         ends = (self._point(places, body, x) for x in (own, (sympy.Integer(0),) * self.size))
         parts = zip(*ends, apart, strict=True)
         along = sympy.expand(sympy.Add(*((tip - root) * part for tip, root, part in parts)))
-        return all(abs(evaluate(x, {})) <= NOISE for x in along.as_coefficients_dict().values())
+        return all(abs(float(x)) <= NOISE for x in along.as_coefficients_dict().values())
 
     def _may_spin(self, inside: Sequence[Joint], ends: Sequence[Joint]) -> bool:
         """Return whether nothing turns inside, or both points are on the axis."""

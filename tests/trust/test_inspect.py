@@ -8,7 +8,7 @@ import sympy
 
 import kincompile as kc
 from kincompile.ir import redundancy
-from kincompile.ir.interpret import interpret
+from kincompile.ir.interpret import interpreter
 
 
 def chain(count):
@@ -328,11 +328,16 @@ def test_that_a_hundred_bodies_are_readable_and_analysed_in_few_steps(monkeypatc
     """Neither a wide pattern nor long lists; and the work does not grow with the redundancy."""
     calls = []
 
-    def counted(*given):
-        calls.append(1)
-        return interpret(*given)
+    def counting(*given):
+        evaluate = interpreter(*given)
 
-    monkeypatch.setattr(redundancy, "interpret", counted)
+        def counted(*state):
+            calls.append(1)
+            return evaluate(*state)
+
+        return counted
+
+    monkeypatch.setattr(redundancy, "interpreter", counting)
     found = kc.inspect(parallel_cranks(33))
     assert len(found.redundant) == 31
     few, calls[:] = len(calls), []
