@@ -121,7 +121,7 @@ def test_that_a_named_node_is_printed_as_its_name(drawn: list[Any]) -> None:
         (lambda g, x, _: g.mul(g.pi(), x), "pi * x"),
         (lambda g, x, y: g.select(g.compare("<", x, y), x, y), "where((x < y), x, y)"),
         (lambda g, x, y: g.logic("&", g.compare("<", x, y), g.pi()), "((x < y) & pi)"),
-        (lambda g, x, _: g.table("rho_a", 2, x), "spline(rho_a, 2, x)"),
+        (lambda g, x, _: g.table("rho_a", 2, x), "f.spline(rho_a, 2, x)"),
     ],
 )  # fmt: skip
 def test_that_text_reads_well(make: Any, text: str) -> None:
