@@ -41,8 +41,8 @@ def jax(given: ModuleType | Transmission, times: ArrayLike = 0.0) -> Callable[..
     given
         What `compile` or `load` returned, or `transmission`.
     times : array_like, optional
-        Of a motion, times from which positions are sought: those at the nearest one begins. A
-        motion over many turns is faster with some times in each, as for `solve`.
+        Of a motion, times whose positions are found beforehand, as by `solve`: others are sought
+        from the nearest of them. A motion of many turns is faster with some times in each.
 
     Returns
     -------
@@ -81,33 +81,33 @@ def _double_precision() -> None:
 
 def _motion(module: ModuleType, times: ArrayLike) -> Callable[..., Any]:
     """Return the function of time and parameters."""
+    import jax
     import jax.numpy as jnp
-    from jax import jit as jitted
 
     first = solve(module, times)
     if not first.success:
         raise SolveError(f"kc.jax starts from the positions at `times`: {first.message}", first)
     defaults = np.array(module.DEFAULTS)
-    position, linear, lanes = _positions(module, first.t, first.q, defaults)
+    position, linear, solved, lanes = _positions(module, first.t, first.q, defaults)
 
     def motion(t: Any, p: Any = defaults) -> tuple[Any, Any, Any]:
         """Return q, q_dot and q_ddot (n,) at a time t and with parameters p (k,)."""
         t, p = jnp.asarray(t, dtype=float), _vector(p, defaults, "p", module.PARAMETERS)
         q = position(t, p)
         factors = linear(q, t, p)[1]
-        q_dot = _array(lanes["solve"](factors, lanes["nu"](q, t, p)))
-        return q, q_dot, _array(lanes["solve"](factors, lanes["gamma"](q, q_dot, t, p)))
+        q_dot = solved(factors, lanes["nu"](q, t, p))
+        return q, q_dot, solved(factors, lanes["gamma"](q, q_dot, t, p))
 
-    return jitted(motion)
+    return jax.jit(motion)
 
 
 def _outputs(f: Transmission) -> Callable[..., Any]:
     """Return the function of inputs and parameters."""
+    import jax
     import jax.numpy as jnp
-    from jax import jit as jitted
 
     module, home, inputs = f.module, f.home, len(f.inputs)
-    position, _, lanes = _positions(module, np.zeros(1), home.q[None], home.p)
+    position, _, _, lanes = _positions(module, np.zeros(1), home.q[None], home.p)
     count = len(home.p) - inputs - len(f.loop.rates)
     others = np.zeros(len(f.loop.rates))
     names = (*module.COORDINATES, *getattr(module, "OUTPUTS", ()))
@@ -124,7 +124,7 @@ def _outputs(f: Transmission) -> Callable[..., Any]:
         columns = jnp.concatenate([q, _array(y[: len(names) - len(q)])])
         return jnp.where(is_twist, jnp.nan, columns[places])
 
-    return jitted(outputs)
+    return jax.jit(outputs)
 
 
 def _vector(given: Any, like: Any, what: str, names: tuple[str, ...]) -> Any:
@@ -147,8 +147,8 @@ def _array(values: Any) -> Any:
     return jnp.stack([jnp.asarray(x, dtype=float) for x in values]) if values else jnp.zeros(0)
 
 
-def _positions(module: ModuleType, t_0: Any, q_0: Any, p_0: Any) -> tuple[Any, Any, Any]:
-    """Return the position q(t, p) with its derivatives, what factors Phi_q, and the code."""
+def _positions(module: ModuleType, t_0: Any, q_0: Any, p_0: Any) -> tuple[Any, Any, Any, Any]:
+    """Return the position q(t, p) with its derivatives, factors of Phi_q, solve, and the code."""
     import jax
     import jax.numpy as jnp
 
@@ -230,4 +230,4 @@ def _positions(module: ModuleType, t_0: Any, q_0: Any, p_0: Any) -> tuple[Any, A
 
     begin, known = jnp.asarray(t_0), jnp.asarray(q_0)
     signs = jax.vmap(lambda q, t: linear(q, t, jnp.asarray(p_0))[2])(known, begin)
-    return position, linear, lanes
+    return position, linear, solved, lanes
