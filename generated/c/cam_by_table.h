@@ -28,6 +28,14 @@ enum {
     CAM_BY_TABLE_NONZEROS = 15,
 };
 
+// Places by name: of coordinates in q and its rates (Q), parameters in p (P) and outputs (Y).
+enum {
+    CAM_BY_TABLE_Q_x_cam = 0, CAM_BY_TABLE_Q_y_cam = 1, CAM_BY_TABLE_Q_phi_cam = 2,
+    CAM_BY_TABLE_Q_x_follower = 3, CAM_BY_TABLE_Q_y_follower = 4,
+    CAM_BY_TABLE_Q_phi_follower = 5, CAM_BY_TABLE_Q_alpha_contact = 6,
+    CAM_BY_TABLE_P_omega = 0,
+};
+
 // Digest of the mechanism; default parameters; where Newton may start; row and column of the
 // entries of Phi_q that are not identically zero.
 extern const char cam_by_table_fingerprint[];

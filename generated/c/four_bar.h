@@ -29,6 +29,15 @@ enum {
     FOUR_BAR_NONZEROS = 25,
 };
 
+// Places by name: of coordinates in q and its rates (Q), parameters in p (P) and outputs (Y).
+enum {
+    FOUR_BAR_Q_x_crank = 0, FOUR_BAR_Q_y_crank = 1, FOUR_BAR_Q_phi_crank = 2,
+    FOUR_BAR_Q_x_coupler = 3, FOUR_BAR_Q_y_coupler = 4, FOUR_BAR_Q_phi_coupler = 5,
+    FOUR_BAR_Q_x_rocker = 6, FOUR_BAR_Q_y_rocker = 7, FOUR_BAR_Q_phi_rocker = 8,
+    FOUR_BAR_P_a = 0, FOUR_BAR_P_b = 1, FOUR_BAR_P_c = 2, FOUR_BAR_P_d = 3,
+    FOUR_BAR_P_omega = 4,
+};
+
 // Digest of the mechanism; default parameters; where Newton may start; row and column of the
 // entries of Phi_q that are not identically zero.
 extern const char four_bar_fingerprint[];

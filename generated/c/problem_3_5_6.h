@@ -25,6 +25,11 @@ enum {
     PROBLEM_3_5_6_NONZEROS = 6,
 };
 
+// Places by name: of coordinates in q and its rates (Q), parameters in p (P) and outputs (Y).
+enum {
+    PROBLEM_3_5_6_Q_x2 = 0, PROBLEM_3_5_6_Q_y2 = 1, PROBLEM_3_5_6_Q_phi3 = 2,
+};
+
 // Digest of the mechanism; default parameters; where Newton may start; row and column of the
 // entries of Phi_q that are not identically zero.
 extern const char problem_3_5_6_fingerprint[];

@@ -29,6 +29,13 @@ enum {
     SLIDER_CRANK_NONZEROS = 21,
 };
 
+// Places by name: of coordinates in q and its rates (Q), parameters in p (P) and outputs (Y).
+enum {
+    SLIDER_CRANK_Q_x_crank = 0, SLIDER_CRANK_Q_y_crank = 1, SLIDER_CRANK_Q_phi_crank = 2,
+    SLIDER_CRANK_Q_x_rod = 3, SLIDER_CRANK_Q_y_rod = 4, SLIDER_CRANK_Q_phi_rod = 5,
+    SLIDER_CRANK_Q_x_slider = 6, SLIDER_CRANK_Q_y_slider = 7, SLIDER_CRANK_Q_phi_slider = 8,
+};
+
 // Digest of the mechanism; default parameters; where Newton may start; row and column of the
 // entries of Phi_q that are not identically zero.
 extern const char slider_crank_fingerprint[];

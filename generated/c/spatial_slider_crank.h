@@ -34,6 +34,25 @@ enum {
     SPATIAL_SLIDER_CRANK_NONZEROS = 97,
 };
 
+// Places by name: of coordinates in q and its rates (Q), parameters in p (P) and outputs (Y).
+enum {
+    SPATIAL_SLIDER_CRANK_Q_x_crank = 0, SPATIAL_SLIDER_CRANK_Q_y_crank = 1,
+    SPATIAL_SLIDER_CRANK_Q_z_crank = 2, SPATIAL_SLIDER_CRANK_Q_e0_crank = 3,
+    SPATIAL_SLIDER_CRANK_Q_e1_crank = 4, SPATIAL_SLIDER_CRANK_Q_e2_crank = 5,
+    SPATIAL_SLIDER_CRANK_Q_e3_crank = 6, SPATIAL_SLIDER_CRANK_Q_x_rod = 7,
+    SPATIAL_SLIDER_CRANK_Q_y_rod = 8, SPATIAL_SLIDER_CRANK_Q_z_rod = 9,
+    SPATIAL_SLIDER_CRANK_Q_e0_rod = 10, SPATIAL_SLIDER_CRANK_Q_e1_rod = 11,
+    SPATIAL_SLIDER_CRANK_Q_e2_rod = 12, SPATIAL_SLIDER_CRANK_Q_e3_rod = 13,
+    SPATIAL_SLIDER_CRANK_Q_x_slider = 14, SPATIAL_SLIDER_CRANK_Q_y_slider = 15,
+    SPATIAL_SLIDER_CRANK_Q_z_slider = 16, SPATIAL_SLIDER_CRANK_Q_e0_slider = 17,
+    SPATIAL_SLIDER_CRANK_Q_e1_slider = 18, SPATIAL_SLIDER_CRANK_Q_e2_slider = 19,
+    SPATIAL_SLIDER_CRANK_Q_e3_slider = 20,
+    SPATIAL_SLIDER_CRANK_P_crank = 0, SPATIAL_SLIDER_CRANK_P_rod = 1,
+    SPATIAL_SLIDER_CRANK_P_omega = 2,
+    SPATIAL_SLIDER_CRANK_Y_x_A = 0, SPATIAL_SLIDER_CRANK_Y_y_A = 1,
+    SPATIAL_SLIDER_CRANK_Y_z_A = 2, SPATIAL_SLIDER_CRANK_Y_transmission = 3,
+};
+
 // Digest of the mechanism; default parameters; where Newton may start; row and column of the
 // entries of Phi_q that are not identically zero.
 extern const char spatial_slider_crank_fingerprint[];

@@ -1,6 +1,7 @@
 """Points and outputs in every target, against closed forms and SymPy's derivatives."""
 
 import json
+import re
 from itertools import chain, pairwise
 
 import numpy as np
@@ -122,6 +123,17 @@ def test_that_javascript_gives_them(model, states, expected, tmp_path):
     parts = zip(*json.loads(text), strict=True)
     found = {name: np.array(values, dtype=float) for name, values in zip(NAMES, parts, strict=True)}
     assert_same(found, expected)
+
+
+def test_that_the_header_of_c_has_places_by_name(model):
+    module, header = kc.compile(model), kc.emit(model, "c").files[f"{model.name}.h"]
+    found = dict(re.findall(r"(\w+_[QPY]_\w+) = (\d+),", header))
+    names = {"Q": module.COORDINATES, "P": module.PARAMETERS, "Y": module.OUTPUTS}
+    assert found == {
+        f"{model.name.upper()}_{kind}_{name}": str(k)
+        for kind, own in names.items()
+        for k, name in enumerate(own)
+    }
 
 
 @pytest.mark.skipif(OCTAVE is None, reason="there is no octave-cli")

@@ -3,8 +3,9 @@
 A block is what its fence says: `python` is run, `text` is what the program before it printed,
 `console` is commands (`$ ...`) and their output, `sh` is make targets. A comment before a block
 changes what is done with it: `file: NAME` also keeps it as a file, `excerpt: NAME` says that the
-file has this text, `alone: NAME` runs it where kincompile and SymPy cannot be imported. In what is
-printed, `...` stands for anything, and counts of iterations and sizes of residuals may differ.
+file has this text, `alone: NAME` runs it where kincompile and SymPy cannot be imported. Code of
+another language is a file, which commands of a console compile and run. In what is printed, `...`
+stands for anything, and counts of iterations and sizes of residuals may differ.
 """
 
 import contextlib
@@ -13,6 +14,7 @@ import io
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import warnings
@@ -27,6 +29,7 @@ from click.testing import CliRunner
 
 import kincompile as kc
 from kincompile.cli import cli
+from kincompile.names import listed
 
 ROOT = Path(__file__).resolve().parents[2]
 RUN = {
@@ -35,7 +38,7 @@ RUN = {
     "docs/forces.md": 5, "docs/dynamics.md": 7, "docs/sensitivities.md": 2,
     "docs/transmissions.md": 10, "docs/other_programs.md": 10,
     "docs/tolerances.md": 4, "docs/space.md": 5, "docs/synthesis.md": 4,
-    "docs/sweeps.md": 9,
+    "docs/sweeps.md": 9, "docs/in_c.md": 13,
     "docs/course/museum.md": 19, "docs/explanation/newton.md": 4, "docs/explanation/signs.md": 4,
 }  # fmt: skip
 """Pages that are run, and how many blocks each has at least."""
@@ -56,6 +59,9 @@ ALONE = (
     "sys.path.insert(0, '.'); runpy.run_path(sys.argv[1])"
 )
 KINDS = {"python", "text", "console", "sh"}
+FOREIGN = {"c", "cpp", "cmake", "html", "javascript", "octave", "rust"}
+"""Languages whose blocks are files."""
+SEARCH_PATH = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
 
 
 @dataclass
@@ -104,11 +110,10 @@ class Reader:
 
     def run(self, command: list[str]) -> str:
         """Run a command, and return what it writes to both streams."""
-        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         return subprocess.run(
             command,
             cwd=self.folder,
-            env={**os.environ, "PATH": path},
+            env={**os.environ, "PATH": SEARCH_PATH},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -121,6 +126,20 @@ def commands(text: str) -> Iterator[tuple[str, str]]:
     for part in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
         command, _, output = part.partition("\n")
         yield command, output
+
+
+def missing_programs(blocks: list[re.Match[str]]) -> list[str]:
+    """Return the programs that commands of a page call, and this machine has not."""
+    lines = (
+        line
+        for block in blocks
+        if block["language"] == "console"
+        for line, _ in commands(block["text"])
+    )
+    called = {part.split()[0] for line in lines for part in re.split(r"&&|\|", line)}
+    return sorted(
+        name for name in called if "/" not in name and not shutil.which(name, path=SEARCH_PATH)
+    )
 
 
 def require(written: str, printed: str) -> None:
@@ -154,8 +173,11 @@ REAL = pytest.param("README.md", RUN["README.md"], True, marks=pytest.mark.slow)
 )
 def test_that_a_page_does_what_it_says(page, least, is_real, tmp_path):
     reader = Reader(tmp_path, is_real)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
     blocks = list(BLOCK.finditer((ROOT / page).read_text(encoding="utf-8")))
     assert len(blocks) >= least
+    if missing := missing_programs(blocks):
+        pytest.skip(f"{page} needs {listed(missing)}")
     failures = [failure for block in blocks if (failure := failure_of(reader, block))]
     if failures:
         pytest.fail("\n\n".join(failures), pytrace=False)
@@ -166,6 +188,18 @@ def test_that_every_block_is_of_a_known_kind():
     assert {block["language"] for block in BLOCK.finditer(README)} == KINDS
     actions = {block["action"] for block in BLOCK.finditer(README)}
     assert actions == {None, "file", "excerpt"}
+
+
+@pytest.mark.parametrize("page", RUN)
+def test_that_code_of_another_language_is_kept_in_a_file(page):
+    blocks = BLOCK.finditer((ROOT / page).read_text(encoding="utf-8"))
+    foreign = [block for block in blocks if block["language"] in FOREIGN]
+    assert [block["text"] for block in foreign if block["action"] not in ("file", "excerpt")] == []
+
+
+def test_that_a_program_that_is_missing_is_named():
+    page = "```console\n$ no_such_program -x && ./own | sort\n```\n"
+    assert missing_programs(list(BLOCK.finditer(page))) == ["no_such_program"]
 
 
 def test_that_the_readme_is_short():

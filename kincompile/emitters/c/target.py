@@ -78,7 +78,8 @@ def files(
     data = {**_without(about, "NAME"), **_tables(code, listing), "body": "".join(body)}
     source = fill("c/module.c.jinja", data)
     guard = f"{program.name.upper()}_H"
-    head = fill("c/module.h.jinja", {**about, "guard": guard, "outputs": indented(_outputs(code))})
+    own = {"guard": guard, "places": _places(program), "outputs": indented(_outputs(code))}
+    head = fill("c/module.h.jinja", {**about, **own})
     return {f"{program.name}.c": source, f"{program.name}.h": head}
 
 
@@ -211,6 +212,16 @@ def _outputs(code: InlineProgram) -> list[str]:
             about = f"{size} entries of {quantity.name}, in the order of the pattern"
             lines.append(f"{program.name}_output {nonzeros_of(quantity)};  // {about}")
     return lines
+
+
+def _places(program: Program) -> str:
+    """Return the lines by which a program finds coordinates, parameters and outputs by name."""
+    kinds = {"Q": program.coordinates, "P": program.parameters, "Y": program.outputs}
+    return "\n".join(
+        _array_lines([f"{program.name.upper()}_{kind}_{x.name} = {k}" for k, x in enumerate(items)])
+        for kind, items in kinds.items()
+        if items
+    )
 
 
 def _array_lines(items: Sequence[str], placeholder: str = "0") -> str:
