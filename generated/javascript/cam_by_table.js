@@ -12,10 +12,12 @@
 // 4-5  PointFollower "contact"         follower - cam     Haug 3.4.32
 // 6    AbsoluteAngle "motor" (driver)  cam                Haug 3.2.6
 //
-// A classic script of a page: it declares cam_by_table. Under node, require() returns the same.
+// A classic script of a page: it declares cam_by_table. Under node, require() returns the same,
+// and import does. With one line more, "export default cam_by_table;", it is an ES module.
 // The functions take one point: arrays q [7], q_dot [7] and p [1], and the time t. Vectors are
 // arrays, and Phi_q is an array of its rows.
-// solver.solve(module, times, p, guess) gives the motion.
+// solver.solve(cam_by_table, times, p, guess) gives the motion: q, q_dot and q_ddot, a time after
+// another, and a status for each; solver.explain(motion) says what ended it.
 
 const cam_by_table = (() => {
     "use strict";
@@ -2034,6 +2036,8 @@ const cam_by_table = (() => {
         return {
             linear: { factor, solve, singularValues }, norm, iterates, Problem, scaledRows, between,
             solve: motionOver, explain,
+            CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE, NOT_REACHED, CORNER: AT_CORNER,
+            NOT_ASSEMBLED, LOCK_UP,
         };
     })();
 

@@ -13,10 +13,12 @@
 // 6-7  Revolute "D"                    rocker - ground   Haug 3.3.10
 // 8    AbsoluteAngle "motor" (driver)  crank             Haug 3.2.6
 //
-// A classic script of a page: it declares four_bar. Under node, require() returns the same.
+// A classic script of a page: it declares four_bar. Under node, require() returns the same,
+// and import does. With one line more, "export default four_bar;", it is an ES module.
 // The functions take one point: arrays q [9], q_dot [9] and p [5], and the time t. Vectors are
 // arrays, and Phi_q is an array of its rows.
-// solver.solve(module, times, p, guess) gives the motion.
+// solver.solve(four_bar, times, p, guess) gives the motion: q, q_dot and q_ddot, a time after
+// another, and a status for each; solver.explain(motion) says what ended it.
 
 const four_bar = (() => {
     "use strict";
@@ -2058,6 +2060,8 @@ const four_bar = (() => {
         return {
             linear: { factor, solve, singularValues }, norm, iterates, Problem, scaledRows, between,
             solve: motionOver, explain,
+            CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE, NOT_REACHED, CORNER: AT_CORNER,
+            NOT_ASSEMBLED, LOCK_UP,
         };
     })();
 

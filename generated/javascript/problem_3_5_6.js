@@ -9,10 +9,12 @@
 // 1    Equation "equation_2"             free equation
 // 2    Equation "equation_3" (driver)    free equation
 //
-// A classic script of a page: it declares problem_3_5_6. Under node, require() returns the same.
+// A classic script of a page: it declares problem_3_5_6. Under node, require() returns the same,
+// and import does. With one line more, "export default problem_3_5_6;", it is an ES module.
 // The functions take one point: arrays q [3], q_dot [3] and p [0], and the time t. Vectors are
 // arrays, and Phi_q is an array of its rows.
-// solver.solve(module, times, p, guess) gives the motion.
+// solver.solve(problem_3_5_6, times, p, guess) gives the motion: q, q_dot and q_ddot, a time after
+// another, and a status for each; solver.explain(motion) says what ended it.
 
 const problem_3_5_6 = (() => {
     "use strict";
@@ -1912,6 +1914,8 @@ const problem_3_5_6 = (() => {
         return {
             linear: { factor, solve, singularValues }, norm, iterates, Problem, scaledRows, between,
             solve: motionOver, explain,
+            CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE, NOT_REACHED, CORNER: AT_CORNER,
+            NOT_ASSEMBLED, LOCK_UP,
         };
     })();
 

@@ -18,10 +18,12 @@
 // 19     Normalization "norm_rod"           rod              Haug 9.3
 // 20     Normalization "norm_slider"        slider           Haug 9.3
 //
-// A classic script of a page: it declares spatial_slider_crank. Under node, require() returns the same.
+// A classic script of a page: it declares spatial_slider_crank. Under node, require() returns the same,
+// and import does. With one line more, "export default spatial_slider_crank;", it is an ES module.
 // The functions take one point: arrays q [21], q_dot [21] and p [3], and the time t. Vectors are
 // arrays, and Phi_q is an array of its rows.
-// solver.solve(module, times, p, guess) gives the motion.
+// solver.solve(spatial_slider_crank, times, p, guess) gives the motion: q, q_dot and q_ddot, a time after
+// another, and a status for each; solver.explain(motion) says what ended it.
 
 const spatial_slider_crank = (() => {
     "use strict";
@@ -2929,6 +2931,8 @@ const spatial_slider_crank = (() => {
         return {
             linear: { factor, solve, singularValues }, norm, iterates, Problem, scaledRows, between,
             solve: motionOver, explain,
+            CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE, NOT_REACHED, CORNER: AT_CORNER,
+            NOT_ASSEMBLED, LOCK_UP,
         };
     })();
 

@@ -492,7 +492,7 @@ def refusal(module: Any, function: str, vector: str, length: int, right: int) ->
 
 
 def in_octave(cases: dict[str, Case], folder: Path) -> Results:
-    """Evaluate by Octave; of an example take the motion that its script finds, too."""
+    """Evaluate by Octave; of an example take the motion, too."""
     lines = []
     for name, case in cases.items():
         kc.emit(case.model, "octave").write(folder)
@@ -505,7 +505,7 @@ def in_octave(cases: dict[str, Case], folder: Path) -> Results:
                 lines.append(f"show('{name}.{quantity}', {name}_{quantity}({arguments})');")
         if name not in OWN:
             shown = ("T", "Q", "Q_dot", "Q_ddot")
-            lines += [name, *(f"show('{name}.{value}', {value});" for value in shown)]
+            lines += [f"[{', '.join(shown)}] = {name}();", *(f"show('{name}.{value}', {value});" for value in shown)]
     found: Results = {}
     for key, rows in run_octave(folder, lines).items():
         name, quantity = key.split(".")

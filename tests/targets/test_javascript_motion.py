@@ -27,6 +27,8 @@ SOLVE = """JSON.stringify(JOBS.map(([t, p, guess]) => {
   return [{ ...found, scales: [[size], Array.from(magnitude), Array.from(noise)] }, event];
 }))"""
 
+STATUSES = "JSON.stringify(Object.entries(MODEL.solver).filter(([, x]) => Number.isInteger(x)))"
+
 RUNNERS = [
     pytest.param(
         in_node, marks=pytest.mark.skipif(NODE is None, reason="node is not installed"), id="node"
@@ -111,6 +113,15 @@ def test_that_motions_in_space_are_those_of_the_runtime(solved, path):
         jobs = [[x[0][::10], *x[1:]] for x in jobs_of(model, module)[:4]]
         for (t, p, _), (found, event) in zip(jobs, solved(model, jobs), strict=True):
             compare(found, event, kc.solve(module, t, p))
+
+
+@pytest.mark.skipif(NODE is None, reason="node is not installed")
+def test_that_statuses_have_the_names_of_the_runtime(example_named, tmp_path):
+    kc.emit(example_named("four_bar").model, "javascript").write(tmp_path)
+    found = json.loads(
+        in_node(tmp_path, {"four_bar": "four_bar"}, STATUSES.replace("MODEL", "four_bar"))
+    )
+    assert dict(found) == {status.name: int(status) for status in Status}
 
 
 @pytest.mark.slow

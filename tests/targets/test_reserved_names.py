@@ -116,8 +116,8 @@ def test_that_a_mechanism_of_any_name_runs_in_javascript(tmp_path, name):
     np.testing.assert_allclose([float(x) for x in done.stdout.split()], expected, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", ["cos", "sin", "zeros", "either", "linspace", "end"])
-def test_that_no_script_of_octave_takes_the_place_of_a_function(tmp_path, name):
+@pytest.mark.parametrize("name", ["cos", "sin", "zeros", "either", "linspace", "end", "T"])
+def test_that_no_motion_of_octave_takes_the_place_of_a_function(tmp_path, name):
     files = kc.emit(arm(name), target="octave").files
     assert f"{name}.m" not in files
     assert next(iter(files)) == f"{name}_.m"

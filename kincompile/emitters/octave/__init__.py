@@ -1,1 +1,1 @@
-"""Octave and MATLAB scripts."""
+"""Functions for Octave and MATLAB."""

@@ -1,7 +1,7 @@
-"""The Octave target, which is MATLAB too: functions of Phi, Phi_q, nu, gamma, and a script.
+"""The Octave target, which is MATLAB too: functions of Phi, Phi_q, nu, gamma, and of the motion.
 
-This is the shape in which courses write them: column vectors, rows that count from 1, and a script
-that solves position, velocity and acceleration over time with Newton's method. No toolbox.
+This is the shape in which courses write them: column vectors, rows that count from 1, and a
+function that solves position, velocity and acceleration over time with Newton's method. No toolbox.
 """
 
 from __future__ import annotations
@@ -70,10 +70,13 @@ CALLED = (
     "linspace", "max", "min", "mod", "NaN", "nargin", "norm", "numel", "ode45", "odeset", "ones",
     "pi", "pinv", "polyval", "qr", "single", "size", "sqrt", "sum", "svd", "true", "zeros",
 )  # fmt: skip
-"""Functions that the files call; a script of such a name would be called in their place."""
+"""Functions that the files call; one of such a name would be called in their place."""
 
 CONSTANTS = ("ans", "e", "i", "I", "j", "J", "NA")
 """And others that a user may write beside them."""
+
+GIVEN = ("LAMBDA", "Q", "Q_ddot", "Q_dot", "T", "drift", "names", "p", "q")
+"""What the function of the motion takes and gives."""
 
 RESERVED: tuple[str, ...] = (
     *KEYWORDS, *CALLED, *quantities.singles(quantities.QUANTITIES), "q", "q_dot", "q_ddot", "t",
@@ -100,9 +103,10 @@ def function(name: str, code: InlineProgram, listing: Listing, printer: Printer)
 def files(
     code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
 ) -> Mapping[str, str]:
-    """Return the .m files, the script first; refuse names longer than MATLAB reads."""
+    """Return the .m files, the motion first; refuse names longer than MATLAB reads."""
     program = code.program
-    found = {NameTable((*KEYWORDS, *CALLED, *CONSTANTS)).take(program.name): _script(code)}
+    name = NameTable((*KEYWORDS, *CALLED, *CONSTANTS, *GIVEN)).take(program.name)
+    found = {name: _motion(code, name)}
     if not program.unsolvable and not program.motion:
         found[f"{program.name}_assemble"] = _assembly(code)
     for name, lines in functions.items():
@@ -199,33 +203,21 @@ def _block_call(step: BlockCall, printer: Printer) -> list[str]:
     return [f"{step.names[0]} = det([", *(f"    {line}" for line in lines), "]);"]
 
 
-def _script(code: InlineProgram) -> str:
-    """Return the script that solves the motion, or with equations of motion integrates it."""
-    program = code.program
-    try:
-        end, points = float(program.end), int(program.points)
-    except (TypeError, ValueError):
-        end, points = math.nan, 0
-    if not math.isfinite(end) or points < 1:
-        raise InputError(
-            f"end = {program.end!r}, points = {program.points!r}: give a finite time, and at least "
-            "one point"
-        )
+def _motion(code: InlineProgram, function: str) -> str:
+    """Return the function that solves the motion, or with equations of motion integrates it."""
+    program, names = code.program, code.program.names_of("coordinates")
     data: dict[str, object] = {
         "name": program.name,
+        "function": function,
         "header": WRITE.header(code),
-        "n": len(program.coordinates),
-        "end": repr(end),
-        "points": points,
-        "defaults": _column(((item.name, item.default) for item in program.parameters), 1),
-        "guess": _column(((item.name, item.guess) for item in program.coordinates), 1),
+        "n": len(names),
+        "first": names[0],
+        "given": _given(code).rstrip("\n"),
     }
-    found = sizes_of(code).scales.values()
-    data["scale"] = _column(zip(program.names_of("coordinates"), found, strict=True), 1)
     if program.motion:
-        names = ("ASSEMBLED", "RANK", "ROUNDING", "TOLERANCE")
-        data |= {"m": len(program.equations), **_criteria(names)}
-        return fill("octave/motion.m.jinja", data)
+        numbers = ("ASSEMBLED", "RANK", "ROUNDING", "TOLERANCE")
+        data |= {"m": len(program.equations), **_criteria(numbers)}
+        return fill("octave/dynamics.m.jinja", data)
     data |= _criteria((
         "MAX_ITERATIONS", "RESIDUAL_FACTOR", "ROUNDING", "SINGULAR_SENSITIVITY", "STEEP",
         "TOLERANCE",
@@ -235,7 +227,30 @@ def _script(code: InlineProgram) -> str:
         "has_redundant": bool(program.redundant),
         "part": repr(criteria.AGREEMENT if program.redundant else criteria.SOLVED),
     }
-    return fill("octave/script.m.jinja", data)
+    return fill("octave/motion.m.jinja", data)
+
+
+def _given(code: InlineProgram) -> str:
+    """Return the statements that take what a caller leaves out from the model."""
+    program, names = code.program, code.program.names_of("coordinates")
+    try:
+        end, points = float(program.end), int(program.points)
+    except (TypeError, ValueError):
+        end, points = math.nan, 0
+    if not math.isfinite(end) or points < 1:
+        raise InputError(
+            f"end = {program.end!r}, points = {program.points!r}: give a finite time, and at least "
+            "one point"
+        )
+    data = {
+        "end": repr(end),
+        "points": points,
+        "defaults": _column(((item.name, item.default) for item in program.parameters), 2),
+        "guess": _column(((item.name, item.guess) for item in program.coordinates), 2),
+        "names": "\n".join(_rows(f"'{name}'" for name in names)),
+        "scale": _column(zip(names, sizes_of(code).scales.values(), strict=True), 1),
+    }
+    return fill("octave/given.m.jinja", data)
 
 
 def _criteria(names: Iterable[str]) -> dict[str, str]:
@@ -279,5 +294,10 @@ def _tables(code: InlineProgram) -> Iterable[str]:
 def _table(name: str, rows: Iterable[str]) -> Iterable[str]:
     """Yield the lines of a table with rows."""
     yield f"s.{name} = ["
-    yield from (f"    {line.replace(',', ';')}" for line in wrapped(rows))
+    yield from _rows(rows)
     yield "];"
+
+
+def _rows(items: Iterable[str]) -> Iterable[str]:
+    """Return the lines of a column, between its brackets."""
+    return (f"    {line.replace(',', ';')}" for line in wrapped(items))
