@@ -505,7 +505,10 @@ def in_octave(cases: dict[str, Case], folder: Path) -> Results:
                 lines.append(f"show('{name}.{quantity}', {name}_{quantity}({arguments})');")
         if name not in OWN:
             shown = ("T", "Q", "Q_dot", "Q_ddot")
-            lines += [f"[{', '.join(shown)}] = {name}();", *(f"show('{name}.{value}', {value});" for value in shown)]
+            lines += [
+                f"[{', '.join(shown)}] = {name}();",
+                *(f"show('{name}.{value}', {value});" for value in shown),
+            ]
     found: Results = {}
     for key, rows in run_octave(folder, lines).items():
         name, quantity = key.split(".")

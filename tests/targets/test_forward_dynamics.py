@@ -162,7 +162,9 @@ def test_that_octave_has_them_and_integrates(octave, tmp_path):
             texts = ", ".join(f"{json.dumps(part[k].tolist())}'" for part in states(name))
             for quantity in ("accelerations", "multipliers"):
                 lines.append(f"show('{name}.{quantity}', {name}_{quantity}({texts}));")
-    found = octave([*lines, "[~, Q, ~, ~, ~, LAMBDA] = mixed();", "show('Q', Q);", "show('LAMBDA', LAMBDA);"])
+    found = octave(
+        [*lines, "[~, Q, ~, ~, ~, LAMBDA] = mixed();", "show('Q', Q);", "show('LAMBDA', LAMBDA);"]
+    )
     for name in MODELS:
         for quantity, known in expected(name).items():
             assert_equal(name, quantity, np.reshape(found[f"{name}.{quantity}"], known.shape))
