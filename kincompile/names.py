@@ -214,13 +214,32 @@ def without_loads(mechanism: str) -> str:
     )
 
 
-def force_units(length: str) -> tuple[str, str, str]:
-    """Return the units of forces, torques and power where lengths have a unit, and masses kg."""
-    if length == "m":
-        return "N", "N*m", "W"
+METRES = {
+    "m": 1.0, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "km": 1e3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9,
+    "in": 0.0254, "inch": 0.0254, "ft": 0.3048, "yd": 0.9144,
+}  # fmt: skip
+"""Units of length, in metres."""
+
+KILOGRAMS = {"kg": 1.0, "g": 1e-3, "t": 1e3, "lb": 0.45359237}
+"""Units of mass, in kilograms."""
+
+
+def newtons(mass: str, length: str) -> float:
+    """Return what a unit of mass times a unit of length by s^2 is in newtons.
+
+    Forces are in newtons where the unit of length is known; else in these very units, which is 1.
+    """
+    return KILOGRAMS[mass] * METRES[length] if length in METRES else 1.0
+
+
+def force_units(length: str) -> tuple[str, str, str, str]:
+    """Return the units of forces, torques, energies and power where lengths have a unit."""
+    if length in METRES:
+        return "N", f"N*{length}", "J", "W"
     if not length:
-        return "", "", ""
-    return f"kg*{length}/s^2", f"kg*{length}^2/s^2", f"kg*{length}^2/s^3"
+        return "", "", "", ""
+    torque = f"kg*{length}^2/s^2"
+    return f"kg*{length}/s^2", torque, torque, f"kg*{length}^2/s^3"
 
 
 def transmission_ends(text: str) -> tuple[list[str], list[str]] | None:

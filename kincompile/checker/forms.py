@@ -165,6 +165,7 @@ def _formulas(reference: Reference, Phi: Sequence[sympy.Expr]) -> Reference | No
                 guess=[item.guess for item in free],
                 bodies=system.bodies,
                 length_unit=system.length_unit,
+                mass_unit=system.mass_unit,
                 end=system.end,
             )
         )

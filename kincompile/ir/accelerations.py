@@ -29,7 +29,6 @@ from kincompile.ir.straight_solve import StraightSolve
 from kincompile.model.points import OutputColumn
 from kincompile.names import (
     correction,
-    force_units,
     listed,
     rate,
     solved,
@@ -68,9 +67,7 @@ def observing_accelerations(code: InlineProgram, left_out: Collection[int] = ())
     motion = _Motion(code, left_out)
     found = motion.accelerations()
     titles = [OutputColumn(solved(name), "") for name in motion.names]
-    body = code.program.bodies[0] if code.program.bodies else None
-    length = code.program.coordinates[body.columns.start].unit if body else ""
-    titles.append(OutputColumn(solved("power"), force_units(length)[2]))
+    titles.append(OutputColumn(solved("power"), ""))
     return _program(code, "accelerations", motion, found, titles, left_out)
 
 

@@ -38,7 +38,7 @@ from kincompile.model.bodies import Parameter
 from kincompile.model.points import OutputColumn
 from kincompile.model.resolve import Joint
 from kincompile.model.resolve_loads import AppliedLoad
-from kincompile.names import force_units, multiplier, rate
+from kincompile.names import METRES, force_units, multiplier, rate
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -190,7 +190,8 @@ class _Forces:
         self._binder = Binder(graph, None)
         body = code.program.bodies[0] if code.program.bodies else None
         length = code.program.coordinates[body.columns.start].unit if body else ""
-        self._force, self._torque, self._power = force_units(length)
+        self._force, self._torque, _, self._power = force_units(length)
+        self._metres = METRES.get(length, 1.0)  # of a unit of length, in which work is not joules
         self._size = len(AXES) if body and len(body.columns) > len(AXES) else len("xy")
         self._turns = [""] if self._size == len("xy") else [f"_{axis}" for axis in AXES]
 
@@ -259,7 +260,7 @@ class _Forces:
         graph, total = self._graph, self._graph.const(0)
         for entry in section.entries["nu"]:
             total = graph.sub(total, graph.mul(self._factors[entry.row], entry.node))
-        return total
+        return graph.mul(total, graph.const(self._metres))
 
     def _on_ground(self) -> Iterator[_Row]:
         """Yield what shakes the ground: weight and applied forces less the rate of momentum."""

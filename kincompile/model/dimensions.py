@@ -1,8 +1,8 @@
 """Units of masses and loads: whether those of parameters fit what they stand for.
 
-What a unit means is known for the usual ones; nothing is said of another. Lengths are in the unit
-of the mechanism, times in seconds, and one unit of mass must serve all: with metres that is the
-kilogram where forces are in newtons, with millimetres the tonne.
+What a unit means is known for the usual ones; nothing is said of another. Lengths and masses are in
+the units of the mechanism, times in seconds, and forces in newtons. So a mass counts in the
+equations by what it is in newtons: of a kilogram in a mechanism in millimetres a thousandth.
 """
 
 from __future__ import annotations
@@ -10,11 +10,13 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import sympy
 
 from kincompile.model.expressions import as_sympy
+from kincompile.names import KILOGRAMS, METRES, listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -27,16 +29,20 @@ if TYPE_CHECKING:
 Dimension = tuple[int, int, int]
 """Powers of mass, length and time."""
 
-MASS, FORCE, TORQUE = (1, 0, 0), (1, 1, -2), (1, 2, -2)
-WORDS: Mapping[Dimension, str] = {
-    MASS: "a mass", FORCE: "a force", TORQUE: "a torque", (1, 2, 0): "a moment of inertia",
-    (1, 0, -2): "a force per length", (1, 0, -1): "a force per velocity",
-    (1, 2, -1): "a torque per angular velocity", (0, 1, 0): "a length", (0, 0, 0): "an angle",
-    (0, 1, -1): "a velocity", (0, 0, -1): "an angular velocity",
+MASS, INERTIA, FORCE, TORQUE = (1, 0, 0), (1, 2, 0), (1, 1, -2), (1, 2, -2)
+WORDS: Mapping[Dimension, tuple[str, str]] = {
+    MASS: ("a mass", "{mass}"), FORCE: ("a force", "N"), TORQUE: ("a torque", "N*{length}"),
+    INERTIA: ("a moment of inertia", "{mass}*{length}^2"),
+    (1, 0, -2): ("a force per length", "N/{length}"),
+    (1, 0, -1): ("a force per velocity", "N*s/{length}"),
+    (1, 2, -1): ("a torque per angular velocity", "N*{length}*s"),
+    (0, 1, 0): ("a length", "{length}"), (0, 0, 0): ("an angle", "rad"),
+    (0, 1, -1): ("a velocity", "{length}/s"), (0, 0, -1): ("an angular velocity", "rad/s"),
 }  # fmt: skip
+"""What there is, and its unit in a mechanism."""
 
 EXPECTED: Mapping[tuple[str, str], Dimension] = {
-    ("Mass", "m"): MASS, **{("Mass", f"J{row}"): (1, 2, 0) for row in ("", "_1", "_2", "_3")},
+    ("Mass", "m"): MASS, **{("Mass", f"J{row}"): INERTIA for row in ("", "_1", "_2", "_3")},
     ("Torque", "F"): TORQUE, ("Torque", "f"): TORQUE, ("FollowerTorque", "f"): TORQUE,
     ("Spring", "k"): (1, 0, -2), ("Spring", "l_0"): (0, 1, 0), ("Spring", "c"): (1, 0, -1),
     ("Spring", "F"): FORCE, ("TorsionSpring", "k"): TORQUE, ("TorsionSpring", "phi_0"): (0, 0, 0),
@@ -48,12 +54,15 @@ EXPECTED: Mapping[tuple[str, str], Dimension] = {
 """Dimensions of attributes and values, by type and symbol."""
 
 UNITS: Mapping[str, tuple[float, Dimension]] = {
-    "m": (1.0, (0, 1, 0)), "mm": (1e-3, (0, 1, 0)), "cm": (1e-2, (0, 1, 0)),
-    "in": (0.0254, (0, 1, 0)), "ft": (0.3048, (0, 1, 0)), "kg": (1.0, MASS), "g": (1e-3, MASS),
-    "t": (1e3, MASS), "s": (1.0, (0, 0, 1)), "ms": (1e-3, (0, 0, 1)), "N": (1.0, FORCE),
-    "kN": (1e3, FORCE), "mN": (1e-3, FORCE), "J": (1.0, TORQUE), "rad": (1.0, (0, 0, 0)),
-    "Nm": (1.0, TORQUE),
+    **{name: (factor, (0, 1, 0)) for name, factor in METRES.items()},
+    **{name: (factor, MASS) for name, factor in KILOGRAMS.items()},
+    "s": (1.0, (0, 0, 1)), "ms": (1e-3, (0, 0, 1)), "N": (1.0, FORCE), "kN": (1e3, FORCE),
+    "mN": (1e-3, FORCE), "J": (1.0, TORQUE), "rad": (1.0, (0, 0, 0)), "Nm": (1.0, TORQUE),
 }  # fmt: skip
+"""Factors to kilograms, metres and seconds, and dimensions."""
+
+INERT = frozenset(symbol for (_, symbol), x in EXPECTED.items() if x in {MASS, INERTIA})
+"""Symbols of the masses and inertias of a body."""
 
 _PART = re.compile(r"([*·/]?)\s*([A-Za-z]+)\s*(?:\^\s*(-?\d))?\s*")
 
@@ -71,36 +80,33 @@ class _Given:
 
 
 def unit_problems(
-    loads: Iterable[tuple[Load, Values]], units: Mapping[str, str], length_unit: str
+    loads: Iterable[tuple[Load, Values]], units: Mapping[str, str], length: str, mass: str
 ) -> Iterator[str]:
-    """Yield problems with the units of parameters that stand alone for attributes of loads."""
-    found = [item for load, values in loads for item in _given(load, values, units)]
-    length, _ = UNITS.get(length_unit, (math.nan, MASS))
-    masses: dict[str, float] = {}
-    for item in found:
+    """Yield problems with the units of mass and of parameters that stand alone in loads."""
+    if mass not in KILOGRAMS or (length not in METRES and mass != "kg"):
+        known = listed(KILOGRAMS if length in METRES else METRES)
+        of = "mass" if length in METRES else "length"
+        yield (
+            f"masses in {mass} and lengths in {length or 'no unit'} do not give newtons; the unit "
+            f"of {of} can be: {known}"
+        )
+        return
+    for item in chain.from_iterable(_given(load, values, units) for load, values in loads):
+        words, template = WORDS[item.expected]
+        unit = template.format(length=length, mass=mass)
         if item.dimension != item.expected:
-            yield (
-                f"{item.where}: the parameter {item.name!r} has the unit {item.unit}, and "
-                f"{WORDS[item.expected]} is wanted; give another, or correct its unit"
-            )
+            wrong = f"{words} is wanted; give another, or correct its unit"
+        elif length in METRES and not math.isclose(item.factor, _factor(unit)):
+            wrong = f"{words} is in {unit} here; give its value in that"
+            wrong += ", or another mass_unit" if item.expected in {MASS, INERTIA} else ""
+        else:
             continue
-        of_mass, of_length, _ = item.dimension
-        if of_mass:
-            masses[f"{item.where} ({item.unit})"] = item.factor / length**of_length
-        elif item.factor != 1 and not math.isclose(item.factor, length**of_length):
-            yield (
-                f"{item.where}: the parameter {item.name!r} has the unit {item.unit}, and the "
-                f"mechanism is in {length_unit} and s; give its value in those"
-            )
-    first = next(iter(masses.items()), None)
-    for where, mass in masses.items():
-        if first is not None and not (math.isnan(mass) or math.isclose(mass, first[1])):
-            yield (
-                f"{where}: its unit does not go with that of {first[0]}: with lengths in "
-                f"{length_unit} one has masses in {first[1]:g} kg, the other in {mass:g} kg; give "
-                "all in units that belong together, as kg, m, N or t, mm, N"
-            )
-            return
+        yield f"{item.where}: the parameter {item.name!r} has the unit {item.unit}, and {wrong}"
+
+
+def scaled(value: Scalar, factor: float, symbol: str) -> Scalar:
+    """Return a mass or a moment of inertia times a factor, and what is neither as it is."""
+    return as_sympy(value) * factor if symbol in INERT else value
 
 
 def _given(load: Load, values: Values, units: Mapping[str, str]) -> Iterator[_Given]:
@@ -109,13 +115,20 @@ def _given(load: Load, values: Values, units: Mapping[str, str]) -> Iterator[_Gi
     for name, argument in load.arguments().items():
         expected = EXPECTED.get((kind, argument.symbol))
         for value in values.get(argument.symbol, ()):
-            _, rest = as_sympy(value).as_coeff_Mul()
-            if expected is None or not isinstance(rest, sympy.Symbol):
+            number, rest = as_sympy(value).as_coeff_Mul()
+            # Other numbers than 2 or 1/3 may have a unit: a mass by length, times a length.
+            if expected is None or not (number.is_Rational and isinstance(rest, sympy.Symbol)):
                 continue
             unit = units.get(rest.name, "")
             if unit and (meant := _meaning(unit)) is not None:
                 where = f"{kind} {load.name!r}, {name}"
                 yield _Given(where, rest.name, unit, *meant, expected)
+
+
+def _factor(unit: str) -> float:
+    """Return the factor of a known unit to kg, m and s."""
+    meant = _meaning(unit)
+    return math.nan if meant is None else meant[0]
 
 
 def _meaning(unit: str) -> tuple[float, Dimension] | None:

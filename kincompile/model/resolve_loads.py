@@ -5,7 +5,7 @@ Every problem is collected, none is raised.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from itertools import chain
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,7 +14,7 @@ import sympy
 
 from kincompile.derive.loads import derive_load
 from kincompile.model.arguments import Kind
-from kincompile.model.dimensions import unit_problems
+from kincompile.model.dimensions import scaled, unit_problems
 from kincompile.model.expressions import as_sympy, symbol_names
 from kincompile.model.load import Load
 from kincompile.model.outputs import Output, ResolvedOutput, highest_rate
@@ -32,7 +32,7 @@ from kincompile.model.scope import (
     checked_point,
     named_tables,
 )
-from kincompile.names import listed, name_problem
+from kincompile.names import listed, name_problem, newtons
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -86,6 +86,15 @@ class AppliedLoad:
         """Return the forces and attributes by their symbol, points as their components."""
         return {name: (value,) for name, value in self.scalars.items()} | dict(self.points)
 
+    def times(self, factor: float) -> AppliedLoad:
+        """Return the mass of a body in newtons: with mass and inertias times a factor."""
+        scalars = {name: scaled(x, factor, name) for name, x in self.scalars.items()}
+        points = {
+            name: tuple(scaled(x, factor, name) for x in point)
+            for name, point in self.points.items()
+        }
+        return replace(self, scalars=scalars, points=points)
+
     def entries(self, quantity: str) -> Iterator[tuple[int, int, Expression]]:
         """Yield row, column and formula of the entries of M or of Q that it adds to."""
         derived = derive_load(self.template, self.others, varies=self.varies)
@@ -102,7 +111,12 @@ class AppliedLoad:
 
 
 def resolved_loads(
-    bodies: Iterable[Body], loads: Sequence[Any], gravity: Any, scope: Scope, length_unit: str
+    bodies: Iterable[Body],
+    loads: Sequence[Any],
+    gravity: Any,
+    scope: Scope,
+    length_unit: str,
+    mass_unit: str,
 ) -> tuple[AppliedLoad, ...]:
     """Return the masses of bodies, then the loads, as far as they are good."""
     masses = (
@@ -110,13 +124,21 @@ def resolved_loads(
         for body in bodies
         if body.is_heavy
     )
-    given = chain((item for item in masses if item is not None), loads)
-    found = (_resolved(item, scope) for item in given)
-    known = tuple(item for item in found if item is not None)
+    heavy = _known((item for item in masses if item is not None), scope)
+    known = (*heavy, *_known(loads, scope))
     units = {name: parameter.unit for name, parameter in scope.parameters.items()}
     values = ((item.written, item.by_symbol()) for item in known)
-    scope.problems += unit_problems(values, units, length_unit)
-    return known
+    wrong = [*unit_problems(values, units, length_unit, mass_unit)]
+    scope.problems += wrong
+    factor = 1.0 if wrong else newtons(mass_unit, length_unit)
+    if factor == 1:
+        return known
+    return (*(item.times(factor) for item in heavy), *known[len(heavy) :])
+
+
+def _known(loads: Iterable[Any], scope: Scope) -> tuple[AppliedLoad, ...]:
+    found = (_resolved(item, scope) for item in loads)
+    return tuple(item for item in found if item is not None)
 
 
 def _resolved(load: Any, scope: Scope) -> AppliedLoad | None:

@@ -79,7 +79,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         Springs, forces and the like.
     ground
         The fixed frame of the bodies.
-    gravity, length_unit, end, points, tasks
+    gravity, length_unit, mass_unit, end, points, tasks
         As for `Mechanism`.
 
     Attributes
@@ -110,8 +110,8 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     __slots__ = (
         "bodies", "body_points", "constraints", "coordinates", "end", "end_given", "equations",
-        "gravity", "ground", "length_unit", "loads", "name", "observers", "parameters", "points",
-        "tasks",
+        "gravity", "ground", "length_unit", "loads", "mass_unit", "name", "observers", "parameters",
+        "points", "tasks",
     )  # fmt: skip
 
     name: str
@@ -126,6 +126,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     loads: tuple[AppliedLoad, ...]
     gravity: Scalars
     length_unit: str
+    mass_unit: str
     end: float
     end_given: Scalar
     points: int
@@ -145,6 +146,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         gravity: Scalars = (0, 0),
         ground: Body = GROUND,
         length_unit: str = "m",
+        mass_unit: str = "kg",
         end: Scalar = 1.0,
         points: int = 101,
         tasks: Mapping[str, Any] | None = None,
@@ -171,9 +173,8 @@ class ConstraintSystem(MatrixViews, TextViews):
         scope = _scope(bodies, found, declared, problems, ground)
         constraints = _resolved(written, scope)
         observers = resolved_observers(body_points, asked, scope, length_unit)
-        applied = _loads(
-            bodies, members(loads, "loads", problems), gravity, scope, written, length_unit
-        )
+        given = members(loads, "loads", problems)
+        applied = _loads(bodies, given, gravity, scope, written, (length_unit, mass_unit))
         if not written and not applied:
             problems.append(f"{name!r} has no constraints; add joints and drivers, or equations")
         if not found and not bodies:
@@ -185,8 +186,8 @@ class ConstraintSystem(MatrixViews, TextViews):
             "name": name, "bodies": bodies, "coordinates": tuple(found), "parameters": declared,
             "constraints": constraints, "equations": names, "body_points": body_points,
             "observers": observers, "loads": applied, "gravity": gravity, "ground": ground,
-            "length_unit": length_unit, "end": last, "end_given": end, "points": points,
-            "tasks": tasks or {},
+            "length_unit": length_unit, "mass_unit": mass_unit, "end": last, "end_given": end,
+            "points": points, "tasks": tasks or {},
         }  # fmt: skip
         _fill(self, values)
 
@@ -313,7 +314,7 @@ def _loads(
     gravity: Scalars,
     scope: Scope,
     constraints: Iterable[Constraint | Equation],
-    length_unit: str,
+    units: tuple[str, str],
 ) -> tuple[AppliedLoad, ...]:
     """Return the masses and the loads; a model that has none does not import what they need."""
     if not loads and not any(body.is_heavy for body in bodies):
@@ -321,7 +322,7 @@ def _loads(
     from kincompile.model.resolve_loads import check_named, resolved_loads
 
     check_named(loads, (item.name for item in constraints), scope.problems)
-    return resolved_loads(bodies, loads, gravity, scope, length_unit)
+    return resolved_loads(bodies, loads, gravity, scope, *units)
 
 
 def _fill(system: ConstraintSystem, values: Mapping[str, Any]) -> None:

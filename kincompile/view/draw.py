@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.errors import InputError
-from kincompile.names import listed
+from kincompile.names import METRES, listed
 from kincompile.view.drawing import drawing
-from kincompile.view.dxf import LENGTHS, as_dxf
+from kincompile.view.dxf import as_dxf
 from kincompile.view.svg import as_svg
 from kincompile.view.traces import described, moving_system, traced_places
 from kincompile.writing import require_writable, write_atomically
@@ -138,9 +138,9 @@ def millimetres(system: ConstraintSystem) -> float:
     InputError
         If it is no known unit.
     """
-    if system.length_unit not in LENGTHS:
+    if system.length_unit not in METRES:
         raise InputError(
             f"the unit of length of {system.name} is {system.length_unit!r}: a true size needs one "
-            f"of {listed(LENGTHS)}"
+            f"of {listed(METRES)}"
         )
-    return LENGTHS[system.length_unit][1]
+    return 1000 * METRES[system.length_unit]

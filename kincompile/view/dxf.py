@@ -23,12 +23,11 @@ if TYPE_CHECKING:
 VERSION = "R2010"
 """Version of the files: one that every CAD program of today reads."""
 
-LENGTHS: dict[str, tuple[int, float]] = {
-    "m": (6, 1000.0), "mm": (4, 1.0), "cm": (5, 10.0), "dm": (14, 100.0), "km": (7, 1e6),
-    "um": (13, 1e-3), "µm": (13, 1e-3), "nm": (12, 1e-6), "in": (1, 25.4), "inch": (1, 25.4),
-    "ft": (2, 304.8), "yd": (10, 914.4),
+UNITS = {
+    "m": 6, "mm": 4, "cm": 5, "dm": 14, "km": 7, "um": 13, "µm": 13, "nm": 12, "in": 1, "inch": 1,
+    "ft": 2, "yd": 10,
 }  # fmt: skip
-"""Units of length: the number that DXF has for them as $INSUNITS, and their size [mm]."""
+"""The number that DXF has for units of length as $INSUNITS."""
 
 SPECIAL = ("ground", "joints", "paths")
 """Layers beside those of bodies."""
@@ -61,7 +60,7 @@ def as_dxf(drawn: Drawing, q: Array, length_unit: str, paths: Iterable[Array] = 
     with package_of_extra("ezdxf", "dxf"):
         import ezdxf.filemanagement
     document = ezdxf.filemanagement.new(
-        VERSION, setup=["linetypes"], units=LENGTHS.get(length_unit, (0, 0))[0]
+        VERSION, setup=["linetypes"], units=UNITS.get(length_unit, 0)
     )
     layers = _layers(document, drawn)
     drawn_by("DXF", drawn.dimension)(document.modelspace(), drawn, q, layers, paths)

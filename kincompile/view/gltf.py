@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.view.dxf import LENGTHS
+from kincompile.names import METRES
 from kincompile.view.marks import GROUND_FRAME, FramePoint, Span, moves_with, shape_of
 from kincompile.view.picture import colour_of
 from kincompile.view.shapes import HUES, mixed
@@ -83,7 +83,7 @@ def as_glb(
     for mark in drawn.marks:
         if isinstance(mark, Span) and mark.style not in LEFT_OUT:
             nodes += _rod(file, drawn, mark, q)
-    metres = LENGTHS.get(length_unit, (0, 1000.0))[1] / 1000
+    metres = METRES.get(length_unit, 1.0)
     root = file.node(drawn.name)
     file.nodes[root] |= {"rotation": UPRIGHT, "scale": [metres] * 3, "children": nodes}
     return file.written(root)

@@ -21,7 +21,7 @@ import numpy as np
 
 from kincompile.criteria import HALF, MAX_ITERATIONS, RANK, STEP_TOLERANCE, TOLERANCE
 from kincompile.errors import InputError, SolveError
-from kincompile.names import column_name, force_units, listed, rate, suggestion
+from kincompile.names import METRES, column_name, force_units, listed, rate, suggestion
 from kincompile.runtime.dynamics.equations import Equations, dynamics_of
 from kincompile.runtime.dynamics.happenings import Watch
 from kincompile.runtime.dynamics.integrate import Integration
@@ -193,9 +193,10 @@ def _solution(inputs: Inputs, found: Integration) -> Solution:
         **inputs.about(),
     )
     length = code.units[code.coordinates[code.bodies[0][1]]] if code.bodies else ""
-    energy = force_units(length)[1].replace("N*m", "J")
+    energy, metres = force_units(length)[2], METRES.get(length, 1.0)
     units = dict(zip(ADDED, (energy, energy, energy, ""), strict=True))
-    columns = np.stack((found.kinetic, found.work, found.energy_drift, found.drift), axis=-1)
+    energies = (metres * item for item in (found.kinetic, found.work, found.energy_drift))
+    columns = np.stack((*energies, found.drift), axis=-1)
     return solution.observing(solution.observed.joined(ADDED, units, columns))
 
 

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from kincompile.criteria import NEAR_MISS, SLIGHT
 from kincompile.errors import InputError
 from kincompile.html import Shown
-from kincompile.names import unknown
+from kincompile.names import METRES, unknown
 from kincompile.runtime.results.forces import Forces
 
 if TYPE_CHECKING:
@@ -30,11 +30,11 @@ class Flywheel(Shown):
     driver : str
         Its name.
     inertia : float
-        Moment of inertia that it needs [mass length^2].
+        Moment of inertia that it needs [kg*m^2].
     energy : float
-        Energy that it takes up and gives back in a cycle [force length].
+        Energy that it takes up and gives back in a cycle [J].
     mean_torque : float
-        Torque of the motor, which is constant then.
+        Torque of the motor, which is constant then [N*m].
     speed, fluctuation : float
         Mean angular velocity, and the largest less the smallest one as a part of it.
     t_fastest, t_slowest : float
@@ -138,4 +138,5 @@ def _checked(found: Forces, driver: str, fluctuation: Any) -> tuple[Array, Array
             f"the torque of {driver!r} is not known at every time, or nothing loads it: see "
             ".motion.message and .undetermined."
         )
-    return torque, power
+    _, _, length = found.motion.units[f"drive_{driver}"].partition("*")
+    return torque * METRES.get(length, 1.0), power

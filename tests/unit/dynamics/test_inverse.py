@@ -244,20 +244,22 @@ def test_the_balance_of_power_and_of_momentum_in_every_example(name, model):
     good = np.isfinite(solution.q_ddot).all(axis=1)
     assert good.any()
     g = np.array([[0.4], [-G]])
+    metre = {"m": 1.0, "mm": 1e-3}[model.length_unit]
     supplied, gained = np.zeros(len(times)), np.zeros(len(times))
     force, moment = np.zeros((2, len(times))), np.zeros(len(times))
     largest = np.zeros(len(times))
     for body in model.bodies:
         ((place, v, a),) = motion_of_points(solution, body.name, body.centre)
         w, alpha = solution[f"{body.name}.phi_dot"], solution[f"{body.name}.phi_ddot"]
-        terms = body.mass * (v * a).sum(axis=0), body.inertia * w * alpha
-        weight = body.mass * (g * v).sum(axis=0)
-        gained += sum(terms)
-        supplied += weight
-        largest += sum(map(np.abs, (*terms, weight)))
-        own = body.mass * (g - a)
+        mass, inertia = metre * body.mass, metre * body.inertia  # in newtons and units of length
+        terms = mass * (v * a).sum(axis=0), inertia * w * alpha
+        weight = mass * (g * v).sum(axis=0)
+        gained += metre * sum(terms)
+        supplied += metre * weight
+        largest += metre * sum(map(np.abs, (*terms, weight)))
+        own = mass * (g - a)
         force += own
-        moment += cross(place, own) - body.inertia * alpha
+        moment += cross(place, own) - inertia * alpha
     for drive in found.motion.observed.names:
         if drive.startswith("P_"):
             supplied += found[drive]
@@ -495,14 +497,66 @@ def test_that_a_spring_of_length_zero_is_told():
     assert "the loads on arm have no value at t = 0" in found.message
 
 
-def test_the_unit_of_a_force_is_that_of_lengths_and_kilograms():
-    m = kc.Mechanism("wheel", length_unit="mm")
-    wheel = m.body("wheel", mass=3, inertia=0.25, centre=(1, 0))
+def wheel_in(length_unit: str, mass_unit: str, metre: float, kilogram: float) -> kc.Mechanism:
+    """A wheel that is out of balance, on a spring: a metre and a kilogram are so many units."""
+    m = kc.Mechanism("wheel", length_unit=length_unit, mass_unit=mass_unit)
+    m.gravity = (0, -G * metre)
+    inertia = 0.25 * kilogram * metre**2
+    wheel = m.body("wheel", mass=3 * kilogram, inertia=inertia, centre=(0.1 * metre, 0))
     m.add(kc.Revolute("O", m.ground, (0, 0), wheel, (0, 0)))
-    m.add(kc.AbsoluteAngle("motor", wheel, kc.t))
-    found = kc.forces(kc.solve(kc.compile(m), [0.0, 0.1]))
-    assert found.motion.units["F_x_O"] == "kg*mm/s^2"
-    assert found.motion.units["drive_motor"] == "kg*mm^2/s^2"
+    m.add(kc.AbsoluteAngle("motor", wheel, 3 * kc.t + 5 * kc.t**2))
+    ends = (m.ground, (0.5 * metre, 0), wheel, (0, 0.2 * metre))
+    m.add(kc.Spring("spring", *ends, stiffness=40 / metre, free_length=0.1 * metre))
+    return m
+
+
+@pytest.mark.parametrize(
+    ("units", "metre", "kilogram", "known"),
+    [
+        (("mm", "kg"), 1e3, 1.0, ("N", "N*mm", "W", "J")),
+        (("mm", "t"), 1e3, 1e-3, ("N", "N*mm", "W", "J")),
+        (("in", "lb"), 1 / 0.0254, 1 / 0.45359237, ("N", "N*in", "W", "J")),
+        (("m", "g"), 1.0, 1e3, ("N", "N*m", "W", "J")),
+    ],
+)
+def test_that_forces_are_newtons_whatever_the_units_of_length_and_mass(
+    units, metre, kilogram, known
+):
+    """Beside the same wheel in metres and kilograms, whose torque is known by hand."""
+    force, torque, power, energy = known
+    t = np.linspace(0, 0.4, 5)
+    here = kc.compile(wheel_in(units[0], units[1], metre, kilogram))
+    there = kc.compile(wheel_in("m", "kg", 1.0, 1.0))
+    found, wanted = (kc.forces(kc.solve(module, t)) for module in (here, there))
+    angle = 3 * t + 5 * t**2
+    about, length = 0.25 + 3 * 0.1**2, np.sqrt(0.5**2 + 0.2**2 + 0.2 * np.sin(angle))
+    slope = 3 * G * 0.1 * np.cos(angle) + 40 * (length - 0.1) * 0.1 * np.cos(angle) / length
+    np.testing.assert_allclose(wanted["drive_motor"], 10 * about + slope, rtol=1e-12)
+    for name, unit, factor in (
+        ("F_x_O", force, 1), ("load_spring", force, 1), ("drive_motor", torque, metre),
+        ("P_motor", power, 1),
+    ):  # fmt: skip
+        assert found.motion.units[name] == unit
+        np.testing.assert_allclose(found[name], factor * wanted[name], rtol=1e-11, atol=1e-11)
+    speed = 3 + 10 * t
+    np.testing.assert_allclose(wanted["P_motor"], wanted["drive_motor"] * speed, rtol=1e-12)
+    free = wheel_in(units[0], units[1], metre, kilogram)
+    free.constraints.pop()
+    moved = kc.simulate(kc.compile(free), t)
+    assert moved.observed.units["kinetic_energy"] == energy
+    np.testing.assert_allclose(
+        moved["kinetic_energy"], about * moved["wheel.phi_dot"] ** 2 / 2, rtol=1e-9
+    )
+
+
+def test_that_forces_without_a_known_unit_of_length_say_so():
+    module = kc.compile(wheel_in("px", "kg", 1.0, 1.0))
+    found = kc.forces(kc.solve(module, [0.0, 0.1]))
+    assert found.motion.units["F_x_O"] == "kg*px/s^2"
+    assert found.motion.units["drive_motor"] == "kg*px^2/s^2"
+    for lengths, masses in (("px", "t"), ("mm", "stone")):
+        with pytest.raises(kc.ModelError, match="do not give newtons; the unit of"):
+            wheel_in(lengths, masses, 1.0, 1.0).system()
 
 
 def test_that_every_point_of_a_redundant_mechanism_is_balanced():
