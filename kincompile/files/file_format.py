@@ -13,6 +13,7 @@ from kincompile.model.bodies import Coordinate, Parameter
 from kincompile.model.declared import Field, declared_fields
 from kincompile.model.equation import Equation
 from kincompile.model.outputs import Output
+from kincompile.names import KILOGRAMS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -69,6 +70,7 @@ def _model(count: int) -> dict[str, Field]:
         "space": Field({"const": SPACE}) if prefix else _optional({"enum": [PLANE, SPACE]}),
         "name": Field(kind.NAME),
         "length_unit": _optional(kind.UNIT),
+        "mass_unit": _optional(kind.one_of(KILOGRAMS)),
         "analysis": _optional(kind.ref("analysis")),
         "parameters": _optional(kind.tables("parameter")),
         "bodies": _optional(own["body"]),
@@ -96,7 +98,10 @@ _KINDS: Mapping[Kind, Mapping[str, Any]] = {
 def argument_schema(item: Kind, axes: tuple[str, ...]) -> Mapping[str, Any]:
     """Return the schema of an argument, whose points have components along these axes."""
     if item in (Kind.POINT, Kind.AXIS):
-        return kind.components(len(axes), words=f"[{', '.join(axes)}]")
+        words = f"[{', '.join(axes)}]"
+        place = kind.components(len(axes), words=words)
+        named = {"description": f"{words}, or the name of a drawn joint"}
+        return place if item is Kind.AXIS else kind.any_of(kind.NAME, place) | named
     if item is Kind.LOADS:
         words = ", ".join(f"F_{axis}" for axis in "xyz"[: len(axes)])
         return kind.components(len(axes), kind.VALUE, words=f"[{words}]")

@@ -79,12 +79,14 @@ class _ModelReader(BodyReader):
         data = self.document.data
         if not self._is_model(data):
             return None
-        self.has_fields((), data, form.fields_of("model", self.words.count))
+        fields = form.fields_of("model", self.words.count)
+        self.has_fields((), data, fields)
         name = self.name(data, (), "the model") or "model"
         given = [self._parameter(*item) for item in self.rows(data, "parameters")]
         parameters = [item for item in given if item]
         options = {
             "length_unit": self.unit(data.get("length_unit", "m"), ("length_unit",), "lengths"),
+            **self.values(data, {"mass_unit": fields["mass_unit"]}, (), None),
             **self._analysis(data.get("analysis", {})),
         }
         drawn = self.words.mechanism(name)
@@ -104,6 +106,7 @@ class _ModelReader(BodyReader):
             "bodies": [*drawn.bodies, *(item for item in bodies if item)],
             "coordinates": {item.name: item.guess for item in free if item},
             "constraints": [*drawn.constraints, *(item for item in constraints if item)],
+            "drawn": drawn.drawn,
             "outputs": [*drawn.outputs, *(item for item in (*points, *outputs) if item)],
             "loads": [item for item in loads if item],
             "gravity": self._gravity(data),
@@ -156,7 +159,10 @@ class _ModelReader(BodyReader):
     ) -> Mechanism | ConstraintSystem | None:
         model = self.words.mechanism(name, **options)
         model.parameters, model.bodies = content["parameters"], content["bodies"]
-        model.constraints, model.outputs = content["constraints"], content["outputs"]
+        model.constraints, model.outputs = [], content["outputs"]
+        model.drawn = content["drawn"]
+        for item in content["constraints"]:
+            model.add(item)
         model.gravity, model.tasks = content["gravity"], content["tasks"]
         for load in content["loads"]:
             model.add(load)

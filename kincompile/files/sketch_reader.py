@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import sympy
@@ -17,7 +18,6 @@ from kincompile.files.file_format import (
 )
 from kincompile.model.declared import declared_fields
 from kincompile.model.expressions import t
-from kincompile.model.points import BodyPoint
 from kincompile.names import listed, name_problem, shown
 
 if TYPE_CHECKING:
@@ -74,9 +74,9 @@ class SketchReader(FieldReader):
         except ModelError as error:
             self.problems += [self.located(problem) for problem in error.problems]
             return self.words.mechanism(name)
-        for point in mechanism.outputs:
-            if isinstance(point, BodyPoint):
-                self.names |= dict(zip(point.output_names, point.coordinates, strict=True))
+        for point in mechanism.named_points().values():
+            for key, coordinate in zip(point.output_names, point.coordinates, strict=True):
+                self.names.setdefault(key, coordinate)
         return mechanism
 
     def _within(self, given: Row, section: str, kind: list[Any] | Row) -> Any:
@@ -110,10 +110,10 @@ class SketchReader(FieldReader):
         if kind is None:
             self.problem(address, f"expected a table with one of {listed(parts, 20)}")
             return
-        fields, before = declared_fields(parts[kind]), len(self.problems)
+        known, before = declared_fields(parts[kind]), len(self.problems)
         # What else a link of the plane has are lengths and places, by the names of its joints.
-        is_open = "length" in fields and kind == "link"
-        further = {key: row[key] for key in row if is_open and key not in fields}
+        is_open = "length" in known and kind == "link"
+        further = {key: row[key] for key in row if is_open and key not in known}
         own = {key: row[key] for key in row if key not in further}
         made = self.made(parts[kind], own, address, self.names)
         given = {
@@ -136,4 +136,6 @@ class SketchReader(FieldReader):
                 self.names[coordinate] = sympy.Symbol(coordinate)
                 self.remember(f"guess of {coordinate}", address)
             self.spins |= {key: spin for key, spin, _ in body.on_request}
-        getattr(sketch, kind)(*(x for x in vars(made).values() if x is not None), **given)
+        said = [(item, x) for item in fields(made) if (x := getattr(made, item.name)) is not None]
+        given |= {item.name: x for item, x in said if item.kw_only}
+        getattr(sketch, kind)(*(x for item, x in said if not item.kw_only), **given)

@@ -59,6 +59,7 @@ def model_data(system: ConstraintSystem) -> dict[str, Any]:
         "name": system.name,
         **({"space": SPACE} if len(system.ground.kind.axes) == SPACE else {}),
         "length_unit": system.length_unit,
+        **({} if system.mass_unit == "kg" else {"mass_unit": system.mass_unit}),
         "analysis": row(_analysis(system)),
         **({"gravity": gravity} if any(gravity) else {}),
         **{name: rows for name, rows in sections.items() if rows},

@@ -26,8 +26,8 @@ BodyLike: TypeAlias = Body | str
 ValueLike: TypeAlias = Scalar
 """A number, or an expression of parameters; of `t` too, where it is the value of a driver."""
 
-PointLike: TypeAlias = Scalars
-"""A pair (xi, eta)."""
+PointLike: TypeAlias = Scalars | str
+"""A pair (xi, eta), or the name of a joint that is drawn on the body."""
 
 ProfileLike: TypeAlias = (
     ValueLike

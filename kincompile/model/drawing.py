@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 from kincompile.errors import ModelError
 from kincompile.model.absolute import AbsoluteX, AbsoluteY
 from kincompile.model.bodies import Body
-from kincompile.model.constraint import Constraint
+from kincompile.model.constraint import Constraint, Element
 from kincompile.model.equation import Equation
 from kincompile.model.mechanism import Mechanism
 from kincompile.model.points import BodyPoint
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from kincompile.model.expressions import Scalar, Scalars
     from kincompile.model.scope import Point
 
-Item = TypeVar("Item", bound=Constraint | Equation)
+Item = TypeVar("Item", bound=Element | Equation)
 Made = TypeVar("Made", bound=Body)
 """The type of bodies."""
 
@@ -37,7 +37,7 @@ class Drawing(Generic[Made]):
 
     Parameters
     ----------
-    name, length_unit, end, points
+    name, length_unit, mass_unit, end, points
         As for `Mechanism`.
     """
 
@@ -46,9 +46,16 @@ class Drawing(Generic[Made]):
     distance: ClassVar[type[Constraint]] = Distance
 
     def __init__(
-        self, name: str, *, length_unit: str = "m", end: Scalar = 1.0, points: int = 101
+        self,
+        name: str,
+        *,
+        length_unit: str = "m",
+        mass_unit: str = "kg",
+        end: Scalar = 1.0,
+        points: int = 101,
     ) -> None:
-        self._mechanism = self.builder(name, length_unit=length_unit, end=end, points=points)
+        units = {"length_unit": length_unit, "mass_unit": mass_unit}
+        self._mechanism = self.builder(name, **units, end=end, points=points)
         self._drawn = Drawn(self._mechanism)
 
     def parameter(
@@ -70,6 +77,15 @@ class Drawing(Generic[Made]):
         """Declare a parameter in the unit of length and return its symbol."""
         return self.parameter(name, default, self._mechanism.length_unit, range)
 
+    @property
+    def gravity(self) -> Scalars:
+        """Acceleration of gravity, as that of `Mechanism`: ``s.gravity = (0, -9.81)``."""
+        return self._mechanism.gravity
+
+    @gravity.setter
+    def gravity(self, given: Scalars) -> None:
+        self._mechanism.gravity = given
+
     def joints(self, /, **places: PointLike) -> None:
         """Draw joints: a place by name [length], numbers or expressions of parameters.
 
@@ -90,11 +106,15 @@ class Drawing(Generic[Made]):
         ground = self._mechanism.ground
         known = self._drawn.links[ground.name].places
         own = {name: self._drawn.joints[name] for name in places}
-        self._drawn.links[ground.name] = Link(ground, {**known, **own})
+        self._drawn.keep(Link(ground, {**known, **own}))
 
     def add(self, constraint: Item) -> Item:
-        """Add any constraint, as `Mechanism.add` does; `place` gives its points."""
+        """Add any constraint or load, as `Mechanism.add` does; a point may be a joint's name."""
         return self._mechanism.add(constraint)
+
+    def output(self, name: str, expression: Scalar, unit: str = "") -> Scalar:
+        """Ask for an expression over the motion, as `Mechanism.output` does."""
+        return self._mechanism.output(name, expression, unit)
 
     def slider(
         self,
@@ -102,6 +122,10 @@ class Drawing(Generic[Made]):
         joints: str | Sequence[str],
         along: str | PointLike,
         on: BodyLike | None = None,
+        *,
+        mass: ValueLike | None = None,
+        inertia: Any = None,
+        centre: PointLike | None = None,
     ) -> Made:
         """Add a body that slides along a straight guide without turning, and return it.
 
@@ -116,13 +140,23 @@ class Drawing(Generic[Made]):
             (x, y, z), in the drawing, through the place where the first joint is drawn.
         on
             The link that has a guide given by a direction; the ground if none is named.
+        mass, inertia, centre
+            As those of `Mechanism.body`. On a guide of the ground it never turns, and needs no
+            inertia; it gets one that nothing sees.
         """
         what, on = f"slider {name!r}", self._mechanism.ground if on is None else on
         named = self._drawn.named(joints, what, 1) or ()
         guide = self._drawn.line(named[0], along, on, what) if named else None
-        return self._sliding(name, named, guide)
+        if inertia is None and guide is not None and guide.link.body.is_ground:
+            size = self._drawn.size
+            inertia = mass if size == len("xy") or mass is None else (mass,) * size
+        given = {"mass": mass, "inertia": inertia, "centre": centre}
+        heavy = {name: item for name, item in given.items() if item is not None}
+        return self._sliding(name, named, guide, heavy)
 
-    def _sliding(self, name: str, joints: Sequence[str], guide: Line | None) -> Made:
+    def _sliding(
+        self, name: str, joints: Sequence[str], guide: Line | None, heavy: Mapping[str, Any]
+    ) -> Made:
         """Return the body of a slider, without a guide where something is wrong with it."""
         raise NotImplementedError
 

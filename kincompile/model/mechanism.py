@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 import sympy
 
 from kincompile.errors import ModelError
+from kincompile.model import outputs
 from kincompile.model.bodies import GROUND, Body, Parameter, default_values
 from kincompile.model.constraint import Constraint, Element
+from kincompile.model.drawn_joints import with_places, with_points
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import evaluate
 from kincompile.model.matrices import MatrixViews
@@ -22,8 +24,9 @@ from kincompile.model.text_views import TextViews
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from kincompile.model.arguments import BodyLike, PointLike
+    from kincompile.model.arguments import BodyLike
     from kincompile.model.expressions import Scalar, Scalars
+    from kincompile.model.scope import Point
 
 Item = TypeVar("Item", bound=Element | Equation)
 Model = TypeVar("Model", bound="Mechanism")
@@ -39,8 +42,9 @@ class Mechanism(MatrixViews, TextViews):
     ----------
     name
         Name of the mechanism; it becomes the name of the emitted module.
-    length_unit
-        Unit of lengths, for documentation.
+    length_unit, mass_unit
+        Units of lengths and of masses: ``"m"``, ``"mm"``, ``"in"`` and so on; ``"kg"``, ``"g"``,
+        ``"t"`` or ``"lb"``. Forces are in newtons, torques in newtons times the unit of length.
     end, points
         Default time grid of an analysis: `points` equally spaced times from 0 to `end`, a number or
         an expression of parameters: ``60 / n`` is a revolution at n rpm.
@@ -54,16 +58,25 @@ class Mechanism(MatrixViews, TextViews):
     tasks
         The tables ``tolerance``, ``fit`` and ``sweep`` of the file that it was read from, as data:
         commands of these names read them, and `to_toml` writes them.
+    drawn
+        Of a drawing the places of joints by name, in the frame of each body by its name.
     """
 
     fixed: ClassVar[Body] = GROUND
     point_type: ClassVar[type[BodyPoint]] = BodyPoint
 
     def __init__(
-        self, name: str, *, length_unit: str = "m", end: Scalar = 1.0, points: int = 101
+        self,
+        name: str,
+        *,
+        length_unit: str = "m",
+        mass_unit: str = "kg",
+        end: Scalar = 1.0,
+        points: int = 101,
     ) -> None:
         self.name = name
         self.length_unit = length_unit
+        self.mass_unit = mass_unit
         self.end_given = end
         self.points = points
         self.ground = self.fixed
@@ -74,6 +87,7 @@ class Mechanism(MatrixViews, TextViews):
         self.loads: list[Element] = []
         self.gravity: Scalars = (0,) * len(self.fixed.kind.axes)
         self.tasks: Mapping[str, Any] = {}
+        self.drawn: dict[str, Mapping[str, Point]] = {}
 
     @property
     def end(self) -> float:
@@ -154,7 +168,7 @@ class Mechanism(MatrixViews, TextViews):
         self.bodies.append(body)
         return body
 
-    def point(self, name: str, body: BodyLike, local: PointLike) -> BodyPoint:
+    def point(self, name: str, body: BodyLike, local: Scalars) -> BodyPoint:
         """Name a point of a body and return it: a coupler point, a foot, the end of an arm.
 
         Parameters
@@ -189,23 +203,37 @@ class Mechanism(MatrixViews, TextViews):
         expression
             An expression of coordinates, parameters and `t`, and of rates such as
             ``crank.phi_dot`` or ``kc.outputs.rate(foot.x)``. `kincompile.outputs` has angles,
-            distances, speeds, transmission angles and velocity ratios. The derivatives of one with
+            distances, speeds, transmission angles and velocity ratios, of points or of the names of
+            points and drawn joints. The derivatives of one with
             rates go as far as second rates; what would need a third is NaN.
         unit
             Its unit.
         """
-        self.outputs.append(Output(name, expression, unit))
-        return expression
+        made = with_points(expression, vars(outputs), self.named_points())
+        self.outputs.append(Output(name, made, unit))
+        return cast("Scalar", made)
+
+    def named_points(self) -> dict[str, BodyPoint]:
+        """Return the named points and the joints of a drawing, each on the first link with it."""
+        known = {item.name: item for item in (self.ground, *self.bodies)}
+        joints = {
+            joint: self.point_type(joint, known[body], place)
+            for body, places in reversed(self.drawn.items())
+            for joint, place in places.items()
+            if body in known
+        }
+        return joints | {item.name: item for item in self.outputs if isinstance(item, BodyPoint)}
 
     def add(self, constraint: Item) -> Item:
         """Add a joint, a driver, a free equation or a load, and return it.
 
         Its equations are the next rows of the system, its contact parameters the next coordinates.
+        A point may be the name of a joint that is drawn on its body.
         """
         if not isinstance(constraint, Element):
             self.constraints.append(cast("Equation", constraint))
             return constraint
-        *others, own = constraint.with_own()
+        *others, own = with_places(constraint, self.drawn).with_own()
         for item in (*others, own):
             if item.is_load:
                 self.loads.append(item)
@@ -235,6 +263,7 @@ class Mechanism(MatrixViews, TextViews):
             gravity=self.gravity,
             ground=self.ground,
             length_unit=self.length_unit,
+            mass_unit=self.mass_unit,
             end=self.end_given,
             points=self.points,
             tasks=self.tasks,

@@ -9,7 +9,8 @@ are often wanted; `rate` stands for the time derivative of an expression, in any
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias, cast
+from functools import wraps
+from typing import TYPE_CHECKING, TypeAlias, TypeVar, cast
 
 import sympy
 
@@ -19,6 +20,7 @@ from kincompile.model.arguments import Kind
 from kincompile.model.bodies import Body
 from kincompile.model.declared import declared, given
 from kincompile.model.directions import angle_between, length_of, turning
+from kincompile.model.drawn_joints import asked
 from kincompile.model.expressions import (
     NotAnExpressionError,
     as_expression,
@@ -39,7 +41,7 @@ from kincompile.names import rate as rate_name
 from kincompile.names import unit_problem
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from kincompile.model.expressions import Scalar
     from kincompile.model.resolve import Joint
@@ -97,8 +99,23 @@ class ResolvedOutput(Observed):
         return (OutputColumn(self.name, self.unit),)
 
 
-AnyPoint: TypeAlias = BodyPoint | tuple["Scalar", ...]
-"""A point of a body, or a fixed one (x, y), in space (x, y, z)."""
+AnyPoint: TypeAlias = BodyPoint | str | tuple["Scalar", ...]
+"""A point of a body, the name of one or of a drawn joint, or a fixed one (x, y), (x, y, z)."""
+
+Function = TypeVar("Function", bound="Callable[..., sympy.Expr]")
+
+
+def _by_name(function: Function) -> Function:
+    """Let a function of points take names too, in whose places `Mechanism.output` puts points."""
+
+    @wraps(function)
+    def taking(*given: AnyPoint) -> sympy.Expr:
+        if any(isinstance(item, str) for item in given):
+            points = (x.coordinates if isinstance(x, BodyPoint) else x for x in given)
+            return asked(taking, *points)
+        return function(*given)
+
+    return cast("Function", taking)
 
 
 def angle(i: Body | tuple[AnyPoint, AnyPoint], j: Body | tuple[AnyPoint, AnyPoint]) -> sympy.Expr:
@@ -114,21 +131,25 @@ def angle(i: Body | tuple[AnyPoint, AnyPoint], j: Body | tuple[AnyPoint, AnyPoin
     return _expression(turning(*u, *v))
 
 
+@_by_name
 def distance(point: AnyPoint, other: AnyPoint) -> sympy.Expr:
     """Return the distance of two points [length]."""
     return length(_direction((point, other)))
 
 
-def speed(point: BodyPoint) -> sympy.Expr:
+@_by_name
+def speed(point: BodyPoint | str) -> sympy.Expr:
     """Return the magnitude of a point's velocity."""
     return length(tuple(map(rate, _moving(point))))
 
 
-def acceleration(point: BodyPoint) -> sympy.Expr:
+@_by_name
+def acceleration(point: BodyPoint | str) -> sympy.Expr:
     """Return the magnitude of a point's acceleration; it has no rates of its own."""
     return length(tuple(rate(rate(item)) for item in _moving(point)))
 
 
+@_by_name
 def transmission_angle(before: AnyPoint, joint: AnyPoint, after: AnyPoint) -> sympy.Expr:
     """Return the angle between two links at their joint [rad], 0 to pi: pi/2 transmits best.
 

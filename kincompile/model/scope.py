@@ -200,6 +200,12 @@ def checked_point(given: Any, kind: Kind, where: str, scope: Scope) -> Point:
         components = tuple(given) if is_list else ()
     except (TypeError, ValueError):
         components = ()
+    if isinstance(given, str) and kind is Kind.POINT:
+        scope.problems.append(
+            f"{where}: no joint {given!r} is drawn on this body; give one that is, or "
+            f"({', '.join(axes)}) in its frame"
+        )
+        return (1,) * len(axes)
     if len(components) != len(axes):
         group, number = {2: ("pair", "two"), 3: ("triple", "three")}[len(axes)]
         scope.problems.append(

@@ -143,6 +143,17 @@ class Drawing:
 
 
 @declared
+class Heavy:
+    """What has a mass: about its centre, in the frame of its body."""
+
+    mass: Any = given(kind.EXPRESSION, "Its mass.", default=None, kw_only=True)
+    inertia: Any = given(
+        kind.EXPRESSION, "Its moment of inertia about the centre.", default=None, kw_only=True
+    )
+    centre: Any = given(_PLACE, "Its centre of mass.", unit="length", default=None, kw_only=True)
+
+
+@declared
 class Joined:
     """A rigid link, as it is drawn."""
 
@@ -151,16 +162,29 @@ class Joined:
 
 
 @declared
-class Link(Joined):
+class Link(Joined, Heavy):
     """A rigid link; of more joints than two lengths and places are called as its joints are."""
 
     length: Any = given(
         kind.EXPRESSION, "Length of a link of two joints.", default=None, unit="length"
     )
+    density: Any = given(
+        kind.EXPRESSION, "In place of its mass: that by volume.", default=None, kw_only=True
+    )
+    width: Any = given(
+        kind.EXPRESSION, "That of a straight bar.", unit="length", default=None, kw_only=True
+    )
+    thickness: Any = given(
+        kind.EXPRESSION,
+        "That of a plate; of a bar its width without.",
+        unit="length",
+        default=None,
+        kw_only=True,
+    )
 
 
 @declared
-class Wheel:
+class Wheel(Heavy):
     """A body that turns about one joint."""
 
     wheel: str = given(kind.NAME, "Name of the body.")
@@ -173,7 +197,7 @@ _ALONG = kind.any_of(kind.TEXT, _PLACE) | {
 
 
 @declared
-class Slider:
+class Slider(Heavy):
     """A body that slides along a straight guide without turning."""
 
     slider: str = given(kind.NAME, "Name of the body.")

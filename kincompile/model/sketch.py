@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kincompile.model.absolute import AbsoluteAngle
 from kincompile.model.bodies import GROUND, Body
 from kincompile.model.drawing import Drawing
+from kincompile.model.drawn_masses import mass_of_link
 from kincompile.model.gears import Gear
 from kincompile.model.joints import (
     Revolute,
@@ -39,7 +40,7 @@ class Sketch(Drawing[Body]):
 
     Parameters
     ----------
-    name, length_unit, end, points
+    name, length_unit, mass_unit, end, points
         As for `Mechanism`.
     """
 
@@ -49,6 +50,13 @@ class Sketch(Drawing[Body]):
         joints: str | Sequence[str],
         length: ValueLike | None = None,
         /,
+        *,
+        mass: ValueLike | None = None,
+        inertia: ValueLike | None = None,
+        centre: PointLike | None = None,
+        density: ValueLike | None = None,
+        width: ValueLike | None = None,
+        thickness: ValueLike | None = None,
         **lengths: ValueLike | PointLike,
     ) -> Body:
         """Join joints by a rigid link and return its body.
@@ -61,6 +69,13 @@ class Sketch(Drawing[Body]):
             Two joints or more, as ``"A B C"``.
         length
             Length of a link of two joints.
+        mass, inertia, centre
+            Mass, moment of inertia about the centre of mass, and its place (xi, eta). Without
+            inertia and centre they are those of a straight bar through the joints, or of a plate
+            with the joints as its corners, in order.
+        density, width, thickness
+            In place of the mass: density [mass/length^3] and width of a bar, whose thickness is its
+            width where it is not given; density and thickness of a plate.
         **lengths
             Distances of joints by their names: ``AB=0.3``, or ``hip_knee=0.3``. A joint's own name
             gives its place in the frame of the link: ``P=(0.1, 0.05)``.
@@ -71,27 +86,47 @@ class Sketch(Drawing[Body]):
             return self._added(name)
         outline = drawn.outline(named, *drawn.lengths(what, named, length, lengths))
         places: Mapping[str, Point] = dict.fromkeys(named, (0, 0))
+        heavy: Mapping[str, Any] = {}
+        given = {
+            "mass": mass, "inertia": inertia, "centre": centre, "density": density, "width": width,
+            "thickness": thickness,
+        }  # fmt: skip
         try:
             places = shape(outline)
+            heavy = mass_of_link([*places.values()], given, drawn.values)
         except ShapeError as error:
             drawn.problems.append(f"{what}: {error}")
         angle = drawn_angle(outline, named[0], named[1])
-        return self._added(name, places, drawn.joints[named[0]], angle)
+        return self._added(name, places, drawn.joints[named[0]], angle, **heavy)
 
-    def wheel(self, name: str, joint: str) -> Body:
-        """Add a body that turns about one joint, a gear wheel, and return it; drawn at angle 0."""
+    def wheel(
+        self,
+        name: str,
+        joint: str,
+        *,
+        mass: ValueLike | None = None,
+        inertia: ValueLike | None = None,
+        centre: PointLike | None = None,
+    ) -> Body:
+        """Add a body that turns about one joint, a gear wheel, and return it; drawn at angle 0.
+
+        Mass, inertia and centre are those of `Mechanism.body`.
+        """
         named = self._drawn.named(joint, f"wheel {name!r}", 1, most=1)
         if named is None:
             return self._added(name)
-        return self._added(name, {named[0]: (0, 0)}, self._drawn.joints[named[0]])
+        heavy: dict[str, Any] = {"mass": mass, "inertia": inertia, "centre": centre or (0, 0)}
+        return self._added(name, {named[0]: (0, 0)}, self._drawn.joints[named[0]], **heavy)
 
-    def _sliding(self, name: str, joints: Sequence[str], guide: Line | None) -> Body:
+    def _sliding(
+        self, name: str, joints: Sequence[str], guide: Line | None, heavy: Mapping[str, Any]
+    ) -> Body:
         if guide is None:
             return self._added(name)
         drawn, base = self._drawn.joints, guide.link
         origin = drawn[joints[0]]
         places = {joint: base.turned(minus(drawn[joint], origin)) for joint in joints}
-        body = self._added(name, places, origin, base.angle, guide)
+        body = self._added(name, places, origin, base.angle, guide, **heavy)
         own = (body, (0, 0), guide.axis)
         self.add(Translational(f"{name}_guide", base.body, guide.point, guide.axis, *own))
         return body
@@ -172,20 +207,21 @@ class Sketch(Drawing[Body]):
         origin: Point = (0, 0),
         angle: float = 0.0,
         guide: Line | None = None,
+        **heavy: Any,
     ) -> Body:
         """Add a body, and a pin for each of its joints that another link has already."""
         drawn, places = self._drawn, places or {}
         if name in drawn.links:
             remedy = "draw its joints with s.ground(A=(x, y))" if name == GROUND.name else "rename"
             drawn.problems.append(f"there is a link {name!r} already; {remedy}")
-        body = self._mechanism.body(name, guess=(*origin, angle))
+        body = self._mechanism.body(name, guess=(*origin, angle), **heavy)
         taken = {item.name for item in self._mechanism.constraints}
         for joint, place in places.items():
             other = drawn.first(joint)
             if other is not None:
                 pin = joint if joint not in taken else f"{joint}_{name}"
                 self.add(Revolute(pin, other.body, other.places[joint], body, place))
-        drawn.links[name] = Link(body, places, angle, guide)
+        drawn.keep(Link(body, places, angle, guide))
         return body
 
     def _turning_or_sliding(

@@ -70,10 +70,16 @@ class Drawn:
     joints: dict[str, Point] = field(default_factory=dict)
     links: dict[str, Link] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
+    axes: dict[str, Point] = field(default_factory=dict)  # of hinges in space
 
     def __post_init__(self) -> None:
         ground = self.mechanism.ground
-        self.links[ground.name] = Link(ground, {})
+        self.keep(Link(ground, {}))
+
+    def keep(self, link: Link) -> None:
+        """Note a link, whose joints its constraints and outputs may name."""
+        self.links[link.body.name] = link
+        self.mechanism.drawn[link.body.name] = link.places
 
     @property
     def size(self) -> int:

@@ -55,6 +55,10 @@ SPATIAL = BodyKind(
 
 _PLACE = kinds.components(3, words="[x, y, z]")
 _ROWS = kinds.components(3, kinds.components(3, words="[., ., .]"))
+INERTIA = kinds.any_of(kinds.components(3, words="[J_xi, J_eta, J_zeta]"), _ROWS) | {
+    "description": "[J_xi, J_eta, J_zeta], or three rows of a matrix"
+}
+"""The kind of an inertia about the centre of mass."""
 
 
 @declared(repr=False)
@@ -77,10 +81,8 @@ class Placed:
     z: Any = given(_PLACE, "Direction of its zeta axis.", default=None, kw_only=True)
     mass: Any = given(kinds.EXPRESSION, "Its mass.", default=None, kw_only=True)
     inertia: Any = given(
-        kinds.any_of(kinds.components(3, words="[J_xi, J_eta, J_zeta]"), _ROWS)
-        | {"description": "[J_xi, J_eta, J_zeta], or three rows of a matrix"},
-        "Its inertia about the centre of mass.", default=None, kw_only=True,
-    )  # fmt: skip
+        INERTIA, "Its inertia about the centre of mass.", default=None, kw_only=True
+    )
     centre: Scalars = given(
         kinds.components(3, words="[xi, eta, zeta]"), "Centre of mass in the body's frame.",
         default=(0, 0, 0), unit="length", kw_only=True,

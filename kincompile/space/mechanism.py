@@ -13,7 +13,7 @@ from kincompile.space.points import SpatialPoint
 from kincompile.space.primitives import Normalization
 
 if TYPE_CHECKING:
-    from kincompile.model.arguments import BodyLike, PointLike
+    from kincompile.model.arguments import BodyLike
     from kincompile.model.constraint import Constraint
     from kincompile.model.equation import Equation
     from kincompile.model.expressions import Scalar, Scalars
@@ -36,14 +36,14 @@ class Mechanism(PlanarMechanism):
         position: Scalars = (0, 0, 0),
         orientation: Any = None,
         *,
-        axis: PointLike | None = None,
+        axis: Scalars | None = None,
         angle: Scalar | None = None,
-        x: PointLike | None = None,
-        y: PointLike | None = None,
-        z: PointLike | None = None,
+        x: Scalars | None = None,
+        y: Scalars | None = None,
+        z: Scalars | None = None,
         mass: Scalar | None = None,
         inertia: Any = None,
-        centre: PointLike = (0, 0, 0),
+        centre: Scalars = (0, 0, 0),
     ) -> SpatialBody:
         """Add a body and return it.
 
@@ -92,7 +92,7 @@ class Mechanism(PlanarMechanism):
         self.bodies.append(body)
         return body
 
-    def point(self, name: str, body: BodyLike, local: PointLike) -> SpatialPoint:
+    def point(self, name: str, body: BodyLike, local: Scalars) -> SpatialPoint:
         """Name a point of a body and return it, as `kincompile.Mechanism.point`.
 
         Parameters

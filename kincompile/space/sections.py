@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from kincompile.model import declared as kind
 from kincompile.model import sections as plane
 from kincompile.model.declared import declared, given
-from kincompile.space.bodies import Placed
+from kincompile.space.bodies import INERTIA, Placed
 from kincompile.space.points import SpatialPoint
 
 if TYPE_CHECKING:
@@ -35,7 +35,30 @@ class Drawing(plane.Drawing):
 
 
 @declared
-class Slider(plane.Slider):
+class Heavy(plane.Heavy):
+    """What has a mass: about its centre, along the axes of the ground as it is drawn."""
+
+    inertia: Any = given(
+        INERTIA, "The inertia about the centre, as that of a body.", default=None, kw_only=True
+    )
+    centre: Any = given(_PLACE, "Its centre of mass.", unit="length", default=None, kw_only=True)
+
+
+@declared
+class Link(plane.Joined, Heavy):
+    """A rigid link, as it is drawn."""
+
+    density: Any = given(
+        kind.EXPRESSION, "In place of its mass: that by volume.", default=None, kw_only=True
+    )
+    width: Any = given(
+        kind.EXPRESSION, "That of a bar with a square section.", default=None, kw_only=True,
+        unit="length",
+    )  # fmt: skip
+
+
+@declared
+class Slider(Heavy, plane.Slider):
     """A body that slides along a straight guide without turning."""
 
     along: Any = given(
@@ -60,6 +83,6 @@ TABLES: Mapping[str, type] = {"body": Placed, "point": SpatialPoint, "sketch": D
 """Tables that are others in the plane."""
 
 PARTS: Mapping[str, type] = {
-    "link": plane.Joined, "slider": Slider, "rod": Rod, "drive": plane.Driven,
+    "link": Link, "slider": Slider, "rod": Rod, "drive": plane.Driven,
 }  # fmt: skip
 """Parts of a drawing: methods of `spatial.Sketch`, and their arguments in order."""

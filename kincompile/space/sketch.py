@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import sympy
 
 from kincompile.model.drawing import Drawing
 from kincompile.model.expressions import as_sympy
-from kincompile.model.link_shape import number
+from kincompile.model.link_shape import ShapeError, number
 from kincompile.model.sketch_parts import Line, Link, minus
 from kincompile.names import listed
 from kincompile.space.bodies import SpatialBody
+from kincompile.space.drawn_masses import mass_of_bar
 from kincompile.space.joints import (
     RelativeRotation,
     RelativeTranslation,
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
     from kincompile.model.arguments import PointLike, ValueLike
     from kincompile.model.constraint import Constraint
-    from kincompile.model.expressions import Scalar
     from kincompile.model.scope import Point
     from kincompile.space.points import SpatialPoint
 
@@ -52,7 +52,7 @@ class Sketch(Drawing[SpatialBody]):
 
     Parameters
     ----------
-    name, length_unit, end, points
+    name, length_unit, mass_unit, end, points
         As for `Mechanism`.
     """
 
@@ -62,20 +62,24 @@ class Sketch(Drawing[SpatialBody]):
     }  # fmt: skip
     distance = Distance
 
-    def __init__(
-        self, name: str, *, length_unit: str = "m", end: Scalar = 1.0, points: int = 101
-    ) -> None:
-        super().__init__(name, length_unit=length_unit, end=end, points=points)
-        self._axes: dict[str, Point] = {}
-
     def hinges(self, /, **axes: PointLike) -> None:
         """Let joints be hinges: the direction (x, y, z) of the axis by the name of the joint."""
         for joint, axis in axes.items():
             what = f"hinge {joint!r}"
             if self._drawn.named(joint, what, 1, most=1):
-                self._axes[joint] = self._drawn.direction(axis, what, "a direction (x, y, z)")
+                self._drawn.axes[joint] = self._drawn.direction(axis, what, "a direction (x, y, z)")
 
-    def link(self, name: str, joints: str | Sequence[str]) -> SpatialBody:
+    def link(
+        self,
+        name: str,
+        joints: str | Sequence[str],
+        *,
+        mass: ValueLike | None = None,
+        inertia: Any = None,
+        centre: PointLike | None = None,
+        density: ValueLike | None = None,
+        width: ValueLike | None = None,
+    ) -> SpatialBody:
         """Join joints by a rigid link, as they are drawn, and return its body.
 
         Parameters
@@ -85,12 +89,29 @@ class Sketch(Drawing[SpatialBody]):
         joints
             Two joints or more, as ``"A B C"``. Those that other links have already connect it to
             them: one by a ball or its hinge, two by a hinge through both.
+        mass, inertia, centre
+            Mass, inertia as that of `Mechanism.body`, and place of the centre of mass; the axes are
+            those of the ground. Without inertia and centre they are those of a straight bar between
+            two joints.
+        density, width
+            In place of the mass: those of a bar with a square section [mass/length^3, length].
         """
-        named = self._drawn.named(joints, f"link {name!r}", 2)
-        return self._added(name, named or ())
+        what, drawn = f"link {name!r}", self._drawn
+        named = drawn.named(joints, what, 2) or ()
+        given = {
+            "mass": mass, "inertia": inertia, "centre": centre, "density": density, "width": width,
+        }  # fmt: skip
+        heavy: Mapping[str, Any] = {}
+        try:
+            heavy = mass_of_bar([drawn.joints[joint] for joint in named], given, drawn.values)
+        except ShapeError as error:
+            drawn.problems.append(f"{what}: {error}")
+        return self._added(name, named, heavy=heavy)
 
-    def _sliding(self, name: str, joints: Sequence[str], guide: Line | None) -> SpatialBody:
-        body = self._added(name, joints, guide)
+    def _sliding(
+        self, name: str, joints: Sequence[str], guide: Line | None, heavy: Mapping[str, Any]
+    ) -> SpatialBody:
+        body = self._added(name, joints, guide, heavy)
         if guide is not None:
             cross = self._beside(guide.axis)
             base = (guide.link.body, guide.point, guide.axis, cross)
@@ -147,15 +168,21 @@ class Sketch(Drawing[SpatialBody]):
         """
         return cast("Mechanism", super().mechanism())
 
-    def _added(self, name: str, joints: Sequence[str], guide: Line | None = None) -> SpatialBody:
+    def _added(
+        self,
+        name: str,
+        joints: Sequence[str],
+        guide: Line | None = None,
+        heavy: Mapping[str, Any] | None = None,
+    ) -> SpatialBody:
         drawn = self._drawn
         if name in drawn.links:
             drawn.problems.append(f"there is a link {name!r} already; rename")
         origin = drawn.joints[joints[0]] if joints else ORIGIN
-        body = cast("Mechanism", self._mechanism).body(name, origin)
+        body = cast("Mechanism", self._mechanism).body(name, origin, **(heavy or {}))
         places = {joint: minus(drawn.joints[joint], origin) for joint in joints}
         hinges = self._connected(Link(body, places))
-        drawn.links[name] = Link(body, places, guide=guide, hinge=next(iter(hinges), None))
+        drawn.keep(Link(body, places, guide=guide, hinge=next(iter(hinges), None)))
         return body
 
     def _connected(self, link: Link) -> list[Line]:
@@ -174,7 +201,7 @@ class Sketch(Drawing[SpatialBody]):
                 f"link {link.body.name!r} shares {listed(joints)} with {other.body.name!r}, and "
                 "three shared joints lock the two links; share two (a hinge), or merge the links"
             )
-        axis = self._axes.get(first)
+        axis = self._drawn.axes.get(first)
         if others:
             axis = minus(link.places[others[0]], link.places[first])
         taken = {item.name for item in self._mechanism.constraints}
