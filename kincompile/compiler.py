@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 
 from kincompile import further
 from kincompile.emitters.emission import emit_program
-from kincompile.emitters.registry import TARGETS
+from kincompile.emitters.registry import PACKAGES, TARGETS
 from kincompile.errors import (
     InputError,
     KincompileError,
@@ -72,7 +72,8 @@ def emit(
         A mechanism or a system of free equations.
     target
         Language of the files: ``"numpy"``, ``"c"``, ``"octave"``, which is MATLAB too,
-        ``"javascript"`` or ``"rust"``.
+        ``"javascript"`` or ``"rust"``; or ``"fmi"``, a unit for co-simulation, FMI 3.0: its
+        ``.write("x.fmu")`` writes the archive, with the C files and a library of them.
     form : {"inline", "grouped"}, optional
         ``"inline"`` writes every constraint out, with names and comments; ``"grouped"`` writes one
         function per type of constraint, for mechanisms of any size. Without a choice the size
@@ -114,18 +115,20 @@ def emit(
     """
     _check_target(target, form)
     system = system_of(model)
+    language = PACKAGES[target].language if target in PACKAGES else target
     if transmission is not None:
         if form == "grouped" or sensitivities or dynamics:
             raise UnsupportedError(
                 "a transmission is a file of its own, written out, without sensitivities and "
                 "equations of motion; leave out what is asked for beside it"
             )
-        return transmission_files(system, target, *transmission)[0]
+        emitted, found = transmission_files(system, language, *transmission)
+        return emitted if language == target else _unit(emitted, found, system)
     with _without_collector(system):
         if form == "grouped" and (sensitivities or dynamics):
             what = "sensitivities" if sensitivities else "equations of motion"
             raise UnsupportedError(f"the grouped form has no {what}; use form='inline'")
-        if _is_grouped(system, form) and not TARGETS[target].has_grouped_form:
+        if _is_grouped(system, form) and not TARGETS[language].has_grouped_form:
             raise UnsupportedError(
                 f"the target {target!r} has no grouped form; use target='numpy', or form='inline'"
             )
@@ -134,12 +137,41 @@ def emit(
             code = further.sensitive(code.program, sensitivities)
         if dynamics:
             code = further.moving(code, system)
-        emitted = emit_program(target, code)
+        emitted = emit_program(language, code)
+        if language != target:
+            return _unit(emitted, code, system)
         if target != "numpy" or not isinstance(code, InlineProgram):
             return emitted
         from kincompile.emitters.numpy.march import with_march
 
         return with_march(emitted, code.program)
+
+
+def _unit(
+    emitted: Emitted,
+    code: InlineProgram | GroupedProgram | TransmissionCode,
+    system: ConstraintSystem,
+) -> Emitted:
+    """Return the unit of FMI with emitted C code: of a transmission, or of a motion."""
+    from kincompile.emitters.fmi import motion_unit, transmission_unit
+    from kincompile.ir.transmission import TransmissionCode
+    from kincompile.runtime.native.library import shared_library
+
+    if isinstance(code, TransmissionCode):
+        return transmission_unit(emitted, code, system, shared_library)
+    assert isinstance(code, InlineProgram)
+    if code.program.motion:
+        raise UnsupportedError(
+            "a unit of FMI follows a motion that drivers prescribe, without equations of motion; "
+            "leave out what is asked for beside it"
+        )
+    unit = motion_unit(emitted, code, system, shared_library)
+    if _assembled(system) is None:
+        raise InputError(
+            f"no position of {system.name} was found at t = 0, where a unit of FMI begins: change "
+            "lengths, or what the drivers demand there, or give a better guess."
+        )
+    return unit
 
 
 def transmission_files(
@@ -198,8 +230,8 @@ def _without_collector(system: ConstraintSystem) -> Iterator[None]:
 
 
 def _check_target(target: str, form: str | None) -> None:
-    if target not in TARGETS:
-        raise UnsupportedError(f"there is no target {target!r}; targets are: {listed(TARGETS)}")
+    if target not in (known := [*TARGETS, *PACKAGES]):
+        raise UnsupportedError(f"there is no target {target!r}; targets are: {listed(known)}")
     if form not in (None, "inline", "grouped"):
         raise InputError(f"there is no form {form!r}; forms are: inline, grouped")
 

@@ -112,6 +112,11 @@ def rate(name: str, order: int = 1) -> str:
     return f"{name}_{'d' * order}ot" if order else name
 
 
+def rate_unit(unit: str, order: int) -> str:
+    """Return the unit of a time derivative: of m, m/s and m/s^2; of none, none."""
+    return f"{unit}{('', '/s', '/s^2')[order]}" if unit else ""
+
+
 def rate_of(
     given: str, known: Collection[str], orders: Sequence[int] = range(3)
 ) -> tuple[str, int] | None:

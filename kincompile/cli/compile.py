@@ -15,7 +15,7 @@ from kincompile.cli.shared import (
     require_output,
     transmission_option,
 )
-from kincompile.emitters.registry import TARGETS
+from kincompile.emitters.registry import PACKAGES, TARGETS
 from kincompile.errors import InputError
 from kincompile.names import listed
 from kincompile.writing import require_writable
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from kincompile.emitters.target import Emitted
 
 ENDINGS = {ending: name for name, item in TARGETS.items() for ending in item.endings}
+ENDINGS |= {item.ending: name for name, item in PACKAGES.items()}
 """The target whose files have an ending."""
 
 
@@ -35,7 +36,7 @@ ENDINGS = {ending: name for name, item in TARGETS.items() for ending in item.end
     "--target",
     default="numpy",
     metavar="NAME",
-    help=f"What to emit: {listed(TARGETS)}.",
+    help=f"What to emit: {listed([*TARGETS, *PACKAGES])}.",
 )
 @click.option("--dynamics", is_flag=True, help="The accelerations that follow from forces too.")
 @transmission_option("The mechanism as a function")
@@ -48,11 +49,14 @@ def command(
     target has several files, the others are written beside the one named. A model whose motion
     cannot be solved, because a driver is missing, has a module too, and a warning; with --dynamics
     it has the right side for an integrator, accelerations(q, q_dot, t, p). With --transmission the
-    file is a function from inputs, drivers or coordinates, to outputs, with its Jacobian.
+    file is a function from inputs, drivers or coordinates, to outputs, with its Jacobian. The
+    target fmi is a unit for co-simulation, FMI 3.0: an archive of C files and a library of them.
     """
     emitted = kc.emit(read_model(model), target, dynamics=dynamics, transmission=transmission)
     if emitted.unsolvable and not dynamics:
         click.echo(f"Warning: {emitted.unsolvable}", err=True)
+    if output == "-" and target in PACKAGES:
+        raise InputError(f"{emitted.main} is an archive, which is not text: give -o a file")
     if output == "-":
         print_data("\n".join(emitted.files.values()))
         return
@@ -67,7 +71,7 @@ def command(
 def _destination(output: str, emitted: Emitted, target: str) -> tuple[Path, str]:
     """Return the folder to write to, and the name there of the main file."""
     path = Path(output)
-    usual = next(iter(emitted.files))
+    usual = emitted.main
     if path.is_dir() or (emitted.companions and not path.suffix):
         return path, usual
     other = ENDINGS.get(path.suffix, target)

@@ -9,10 +9,9 @@ import numpy as np
 
 from kincompile.criteria import probe_of
 from kincompile.errors import InputError
-from kincompile.names import rate
+from kincompile.names import rate, rate_unit
 from kincompile.runtime.engine.code import column_meant
 from kincompile.runtime.inputs import names_of
-from kincompile.runtime.results.columns import rate_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

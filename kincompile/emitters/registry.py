@@ -40,6 +40,18 @@ TARGETS = {
 """Languages to emit."""
 
 
+@dataclass(frozen=True, slots=True)
+class Package:
+    """A target that is the files of a language with something round them, in one archive."""
+
+    language: str
+    ending: str
+
+
+PACKAGES = {"fmi": Package("c", ".fmu")}
+"""Archives to emit."""
+
+
 def load_target(name: str) -> Target:
     """Return a target, whose modules are loaded now."""
     target: Target = import_module(f"{TARGETS[name].folder}.target")

@@ -60,6 +60,11 @@ class Emitted(Shown):
         return f"{self.name} as {listed([*self.files, *self.companions[len(self.files) - 1 :]])}"
 
     @property
+    def main(self) -> str:
+        """Name of the main file."""
+        return next(iter(self.files))
+
+    @property
     def source(self) -> str:
         """Text of the main file."""
         return next(iter(self.files.values()))

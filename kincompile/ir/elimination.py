@@ -67,6 +67,11 @@ class Sizes:
     # Values at that position of the entries that vary, with signs, as far as known.
     values: dict[tuple[int, int], float] = field(default_factory=dict)
 
+    @property
+    def length(self) -> float:
+        """The scale of lengths, which is the largest lever arm; 1.0 where there are none."""
+        return next((x for x in self.scales.values() if x != 1), 1.0)
+
     def of(self, graph: Graph, row: int, column: int, node: int) -> float:
         """Return the size of an entry."""
         found = self.entries.get((row, column))

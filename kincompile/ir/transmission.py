@@ -167,7 +167,6 @@ def transmission_code(
     units = [x.unit for x in program.coordinates]
     of_parameters = {x.name: x.unit for x in program.parameters}
     is_angle = turning(units, [item.columns for item in program.bodies])
-    size = max((sizes.scales[k] for k in sizes.scales if not is_angle[k]), default=1.0)
     return TransmissionCode(
         inline(observing),
         tuple(places),
@@ -176,7 +175,7 @@ def transmission_code(
         tuple(outputs),
         tuple(free),
         (*(is_angle[k] for k in free), *(of_parameters[name] == "rad" for name in inputs)),
-        size,
+        sizes.length,
         {
             **{x.name: x.unit for x in program.coordinates},
             **{x.name: x.unit for x in program.outputs},

@@ -64,6 +64,9 @@ UNITS: Mapping[str, tuple[float, Dimension]] = {
 INERT = frozenset(symbol for (_, symbol), x in EXPECTED.items() if x in {MASS, INERTIA})
 """Symbols of the masses and inertias of a body."""
 
+ANGLES = {"rad": 1.0, "deg": math.pi / 180}
+"""Units of angles, in radians; what stands for an angle in a load is in radians."""
+
 _PART = re.compile(r"([*·/]?)\s*([A-Za-z]+)\s*(?:\^\s*(-?\d))?\s*")
 
 
@@ -131,17 +134,38 @@ def _factor(unit: str) -> float:
     return math.nan if meant is None else meant[0]
 
 
-def _meaning(unit: str) -> tuple[float, Dimension] | None:
-    """Return factor to kg, m and s and dimension of a unit, None where it is not known."""
-    factor, powers, place = 1.0, [0, 0, 0], 0
+def base_unit(unit: str) -> tuple[float, dict[str, int]] | None:
+    """Return factor to kg, m, s and rad and their powers, None of a unit that is not known."""
+    plain = re.sub(r"\bdeg\b", "rad", unit)
+    if (meant := _meaning(plain)) is None:
+        return None
+    lengths = dict(zip(("kg", "m", "s"), meant[1], strict=True))
+    turns = {name: sum(x for given, x in _parts(unit) or () if given == name) for name in ANGLES}
+    factor = meant[0] * math.prod(ANGLES[name] ** power for name, power in turns.items())
+    return factor, {**lengths, "rad": sum(turns.values())}
+
+
+def _parts(unit: str) -> list[tuple[str, int]] | None:
+    """Return the units that one is a product of, with their powers; None of another text."""
+    found, place = [], 0
     while place < len(unit):
         part = _PART.match(unit, place)
-        if part is None or part[2] not in UNITS:
+        if part is None:
             return None
-        power = int(part[3] or 1) * (-1 if part[1] == "/" else 1)
-        of_part, dimension = UNITS[part[2]]
+        found.append((part[2], int(part[3] or 1) * (-1 if part[1] == "/" else 1)))
+        place = part.end()
+    return found
+
+
+def _meaning(unit: str) -> tuple[float, Dimension] | None:
+    """Return factor to kg, m and s and dimension of a unit, None where it is not known."""
+    parts = _parts(unit)
+    if parts is None or any(name not in UNITS for name, _ in parts):
+        return None
+    factor, powers = 1.0, [0, 0, 0]
+    for name, power in parts:
+        of_part, dimension = UNITS[name]
         factor *= of_part**power
         powers = [a + power * b for a, b in zip(powers, dimension, strict=True)]
-        place = part.end()
     mass, length, time = powers
     return factor, (mass, length, time)

@@ -40,10 +40,11 @@ COMPILERS = ("cc", "gcc", "clang")
 
 FLAGS = (
     "-std=c99", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast",
-    "-D_WITHOUT_START",
 )  # fmt: skip
-"""None of these changes what a program may assume of floating-point numbers, NaN included. The
-runtime has a start of its own."""
+"""None of these changes what a program may assume of floating-point numbers, NaN included."""
+
+OWN = ("-D_WITHOUT_START",)
+"""Flags of the runtime's libraries: it has a start of its own."""
 
 LARGEST_VECTORIZED = 300_000
 """Characters of source up to which it is optimized in full, an angle's cosine and sine, which are
@@ -74,7 +75,7 @@ def library(name: str, files: Mapping[str, str], fingerprint: str) -> ctypes.CDL
     of itself. An `UnsupportedError` says what is wrong with the compiler.
     """
     source = next(iter(files.values()))
-    command = (*_compiler(), _level(source), *FLAGS, *_machine_flags())
+    command = (*_compiler(), _level(source), *FLAGS, *OWN, *_machine_flags())
     digest = hashlib.sha256()
     for part in (*command, _version(command[0]), _processor(), *files, *files.values()):
         digest.update(part.encode() + b"\0")
@@ -97,6 +98,30 @@ def library(name: str, files: Mapping[str, str], fingerprint: str) -> ctypes.CDL
             f"the C code of {name} cannot be built in the temporary folder: {error.strerror}. Free "
             f"some space or set TMPDIR to another folder, {ALTERNATIVE}."
         ) from error
+
+
+def shared_library(files: Mapping[str, str]) -> bytes | None:
+    """Return the library of emitted C code for every processor of this machine's kind.
+
+    It shows what the code declares to be shown. None, with a warning, where there is no compiler.
+    """
+    try:
+        compiler = _compiler()
+    except UnsupportedError:
+        warnings.warn(
+            "the archive has its sources alone, which whoever imports it must compile: no C "
+            "compiler was found. Install one, or name one by the environment variable CC.",
+            KincompileWarning,
+            stacklevel=3,
+        )
+        return None
+    # Points come one by one: loops over many of them, which -O3 is for, gain nothing.
+    level = min(_level(max(files.values(), key=len)), "-O1")
+    command = (*compiler, level, *FLAGS, "-fvisibility=hidden")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as temporary:
+        built = _built(command, Path(temporary), files)
+        _try(built, next(iter(files)))
+        return built.read_bytes()
 
 
 def _level(source: str) -> str:
@@ -216,9 +241,9 @@ def _built(command: tuple[str, ...], folder: Path, files: Mapping[str, str]) -> 
     """Compile emitted code in a folder and return the library."""
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
-    source = next(iter(files))
+    sources = [name for name in files if name.endswith(".c")]
     built = folder / "library.so"
-    _run((*command, "-fPIC", "-shared", source, "-o", built.name, "-lm"), folder)
+    _run((*command, "-fPIC", "-shared", *sources, "-o", built.name, "-lm"), folder)
     if not built.is_file():
         raise UnsupportedError(f"the C compiler {command[0]} wrote no library; {REPAIR}.")
     return built

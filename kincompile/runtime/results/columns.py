@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.errors import InputError, package_of_extra
-from kincompile.names import rate, rate_of
+from kincompile.names import rate, rate_of, rate_unit
 from kincompile.runtime.engine.code import column_meant
 from kincompile.runtime.status import Status
 
@@ -70,11 +70,6 @@ def shown_unit(unit: str, angle_unit: str) -> tuple[str, float]:
 def titled(name: str, unit: str) -> str:
     """Return a name with its unit in brackets, if there is one."""
     return f"{name} [{unit}]" if unit else name
-
-
-def rate_unit(unit: str, order: int) -> str:
-    """Return the unit of a time derivative: of m, m/s and m/s^2; of none, none."""
-    return f"{unit}{('', '/s', '/s^2')[order]}" if unit else ""
 
 
 def largest(values: NDArray[np.float64]) -> float:

@@ -24,12 +24,13 @@ from kincompile.names import (
     listed,
     parameters_problem,
     quotient_unit,
+    rate_unit,
     unknown,
 )
 from kincompile.runtime.engine.code import SENSITIVE, SENSITIVITIES, code_of, column_meant
 from kincompile.runtime.engine.linear import powers_of_rows
 from kincompile.runtime.inputs import names_of
-from kincompile.runtime.results.columns import largest, rate_unit
+from kincompile.runtime.results.columns import largest
 from kincompile.runtime.results.observed import Points, observed
 from kincompile.runtime.results.solution import require_solution
 

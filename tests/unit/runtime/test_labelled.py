@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kincompile.errors import UnsupportedError
-from kincompile.runtime.results.columns import rate_unit
+from kincompile.names import rate_unit
 from kincompile.runtime.solve import solve
 
 
