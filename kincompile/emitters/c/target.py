@@ -216,11 +216,15 @@ def _outputs(code: InlineProgram) -> list[str]:
 
 def _places(program: Program) -> str:
     """Return the lines by which a program finds coordinates, parameters and outputs by name."""
-    kinds = {"Q": program.coordinates, "P": program.parameters, "Y": program.outputs}
+    named = {
+        "Q": program.names_of("coordinates"),
+        "P": program.names_of("parameters"),
+        "Y": program.names_of("outputs"),
+    }
     return "\n".join(
-        _array_lines([f"{program.name.upper()}_{kind}_{x.name} = {k}" for k, x in enumerate(items)])
-        for kind, items in kinds.items()
-        if items
+        _array_lines([f"{program.name.upper()}_{kind}_{x} = {k}" for k, x in enumerate(names)])
+        for kind, names in named.items()
+        if names
     )
 
 
