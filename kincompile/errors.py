@@ -75,8 +75,17 @@ def package_of_extra(package: str, extra: str) -> Iterator[None]:
         yield
     except ImportError:
         raise UnsupportedError(
-            f"{package} is not installed; pip install 'kincompile[{extra}]' brings it"
+            f"{package} is not installed; {install_command(extra)} brings it"
         ) from None
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra, which leaves a checkout editable."""
+    from pathlib import Path  # takes time to load, and nothing but a missing package needs it
+
+    if (Path(__file__).parents[1] / "pyproject.toml").is_file():
+        return f"pip install -e '.[{extra}]' in the checkout"
+    return f"pip install 'kincompile[{extra}]'"
 
 
 @contextmanager

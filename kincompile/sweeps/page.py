@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from kincompile.errors import install_command
 from kincompile.html import figure_html
 from kincompile.report.document import Chapter, Manuscript, Verbatim, table, text
 from kincompile.report.to_html import as_html
@@ -74,7 +75,7 @@ def _parameters(sweep: Sweep, angle_unit: str) -> Table:
 def _said_of_plots(seen: Overview, plots: str) -> str:
     """Return what stands above the plots."""
     if not plots.strip():
-        return "pip install 'kincompile[plot]' brings matplotlib, and the plots with it."
+        return f"{install_command('plot')} brings matplotlib, and the plots with it."
     some = f"{len(seen.samples):,} of {seen.sweep.contents.plan.grid.variants:,} variants"
     return f"Measures of {some}; of columns least, mean and greatest value over time, of all."
 

@@ -92,7 +92,7 @@ def simulate(
         at which an event is located in time; the motion goes on, or it ends there.
     method : {"DOP853", "Radau", "BDF", "CVODE"}
         SciPy's explicit method of order 8, or for stiff systems its implicit one of order 5, its
-        multistep method, or that of SUNDIALS (``pip install 'kincompile[stiff]'``). Implicit ones
+        multistep method, or that of SUNDIALS (``pip install -e '.[stiff]'``). Implicit ones
         are given the exact derivatives of the accelerations.
     rtol, atol : float
         Relative tolerance of a step; absolute one, in radians and sizes of the mechanism and per

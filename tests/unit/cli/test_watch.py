@@ -231,5 +231,5 @@ def test_that_its_absence_is_told(kincompile, model, monkeypatch):
     done = kincompile("view", model, "--watch")
     assert done.exit_code == 2
     assert done.stderr == (
-        "Error: watchfiles is not installed; pip install 'kincompile[watch]' brings it\n"
+        "Error: watchfiles is not installed; pip install -e '.[watch]' in the checkout brings it\n"
     )

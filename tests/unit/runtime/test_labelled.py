@@ -5,6 +5,7 @@ import sys
 import numpy as np
 import pytest
 
+from kincompile import errors
 from kincompile.errors import UnsupportedError
 from kincompile.names import rate_unit
 from kincompile.runtime.solve import solve
@@ -64,8 +65,13 @@ def test_that_a_table_has_variants_one_below_the_other(variants):
 
 @pytest.mark.parametrize("package", ["pandas", "xarray"])
 def test_that_a_missing_package_is_named(motion, monkeypatch, package):
+    """A checkout stays editable; elsewhere there is no `.` to install."""
     monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(UnsupportedError, match=rf"{package} is not installed; pip install 'kinco"):
+    wanted = rf"{package} is not installed; pip install -e '\.\[tables\]' in the checkout brings it"
+    with pytest.raises(UnsupportedError, match=wanted):
+        getattr(motion, f"to_{package}")()
+    monkeypatch.setattr(errors, "__file__", "/elsewhere/kincompile/errors.py")
+    with pytest.raises(UnsupportedError, match=r"pip install 'kincompile\[tables\]' brings it"):
         getattr(motion, f"to_{package}")()
 
 
