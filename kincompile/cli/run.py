@@ -13,11 +13,16 @@ from kincompile.cli.motion import Motion, motion_options, sweep_options
 from kincompile.cli.progress import progress_bar
 from kincompile.errors import InputError
 from kincompile.names import listed
-from kincompile.runtime.results.write import require_known_suffix, summary
+from kincompile.runtime.results.write import require_known_suffix, summary, variant_named
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     import numpy as np
     from numpy.typing import NDArray
+
+MOST_REASONS = 3
+"""Variants of a sweep that are solved alone, to say why they ended."""
 
 
 @click.command("run")
@@ -43,7 +48,7 @@ def command(
     """Solve the motion of MODEL over time and summarise it.
 
     Position, velocity and acceleration are solved at equally spaced times, from start to end. The
-    summary goes to stdout, or to stderr where a file is written. With --sweep it has a part for
+    summary goes to stdout, or to stderr where a file is written. With --sweep it has a line for
     each parameter set, and a file their values; with --forces both have forces too. Where the
     motion does not converge, what was found is written nevertheless, and the exit code is 3.
     """
@@ -68,6 +73,24 @@ def command(
         solution = kc.solve(
             module, times, numbers | sweeps, product=product, progress=progress, **options
         )
-    shared.give_motion(
-        context, solution, summary(solution, angle_unit), output, angle_unit, has_forces
-    )
+        reasons = _reasons(solution, module, times, options) if sweeps else ""
+    text = summary(solution, angle_unit)
+    shared.give_motion(context, solution, text, output, angle_unit, has_forces, reasons)
+
+
+def _reasons(
+    solution: kc.Solution,
+    module: ModuleType,
+    times: NDArray[np.float64],
+    options: dict[str, Any],
+) -> str:
+    """Return why variants ended: the first ones, each solved alone."""
+    failed = [k for k, found in enumerate(solution.good) if not found.all()]
+    lines = [f"{len(failed)} of {len(solution.q)} variants ended before the last time."]
+    for number in failed[:MOST_REASONS]:
+        own = {name: float(values[number]) for name, values in solution.parameters.items()}
+        alone = kc.solve(module, times, own, **options)
+        lines.append(f"{variant_named(solution, number)}: {alone.message}")
+    if len(failed) > MOST_REASONS:
+        lines.append(f"{len(failed) - MOST_REASONS} more: solve one alone by --set to see why.")
+    return "\n".join(lines)

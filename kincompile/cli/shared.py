@@ -159,10 +159,12 @@ def give_motion(
     output: str | None,
     angle_unit: str,
     has_forces: bool,
+    reasons: str = "",
 ) -> None:
     """Print the summary of a motion, write it where a file is asked for, and exit by its success.
 
-    With `has_forces` both have the forces along it.
+    With `has_forces` both have the forces along it. `reasons` say why not all of it was found; the
+    message of the solution does where none are given.
     """
     written = solution
     if has_forces:
@@ -174,4 +176,4 @@ def give_motion(
         kc.write(written, output, angle_unit=angle_unit)
         click.echo(f"{text}\nWrote {output}", err=True)
     if not solution.success:
-        end_unsolved(context, solution.message)
+        end_unsolved(context, reasons or solution.message)

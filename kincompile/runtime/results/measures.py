@@ -122,8 +122,15 @@ class Measures(Shown):
 
     def table(self, angle_unit: str = "rad") -> str:
         """Return tables of outputs and drivers; angles in ``"rad"`` or ``"deg"``."""
-        parts = (_output_table(self.outputs, angle_unit), driver_table(self.drivers, angle_unit))
-        return "\n\n".join("\n".join(part) for part in parts if part)
+        return "\n\n".join(filter(None, self.tables(angle_unit)))
+
+    def tables(self, angle_unit: str) -> tuple[str, str]:
+        """Return the table of outputs and that of drivers, each "" where there are none."""
+        outputs, drivers = (
+            _output_table(self.outputs, angle_unit),
+            driver_table(self.drivers, angle_unit),
+        )
+        return "\n".join(outputs), "\n".join(drivers)
 
 
 def measures(solution: MotionTable, code: Compiled, p: Array) -> Measures:

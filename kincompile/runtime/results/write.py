@@ -153,29 +153,48 @@ _WRITERS: dict[str, Callable[[Solution, str], str | bytes]] = {
 
 
 def summary(solution: Solution, angle_unit: str = "rad") -> str:
-    """Return the extremes of every coordinate, the measures, and a line on how the solving went.
+    """Return the measures, the extremes of every coordinate, and a line on how the solving went.
 
-    Of variants there is a part for each, under the values of its parameters. Per coordinate it has
+    Of variants there is a table with a line for each. The outputs of
+    `Solution.measures` come first, and its drivers after the coordinates. Per coordinate there are
     the unit, the least and largest value with their times, and the largest absolute values of first
-    and second derivative [unit/s, unit/s^2]; then come the tables of `Solution.measures`, the
-    points by status, the Newton iterations and the largest residual. Points that were not found do
-    not count; `angle_unit` is ``"rad"`` or ``"deg"``.
+    and second derivative [unit/s, unit/s^2]; at the end stand the points by status, the Newton
+    iterations and the largest residual. Points that were not found do not count; `angle_unit` is
+    ``"rad"`` or ``"deg"``.
     """
     if solution.q.ndim > 2:
-        return "\n\n".join(_variant(solution, k, angle_unit) for k in range(len(solution.q)))
-    parts = ["\n".join(_table(solution, angle_unit))]
+        return "\n".join(_variants(solution, angle_unit))
+    outputs = drivers = ""
     if np.isfinite(solution.q_dot).any():
-        parts.append(solution.measures().table(angle_unit))
-    return "\n\n".join(part for part in (*parts, _verdict(solution)) if part)
+        outputs, drivers = solution.measures().tables(angle_unit)
+    coordinates = "\n".join(_table(solution, angle_unit))
+    return "\n\n".join(filter(None, (outputs, coordinates, drivers, _verdict(solution))))
 
 
-def _variant(solution: Solution, number: int, angle_unit: str) -> str:
-    """Return the summary of a variant, under the values of its parameters."""
+def _variants(solution: Solution, angle_unit: str) -> list[str]:
+    """Return a table with a line for each variant: how far it was found, extremes of outputs."""
+    units, given = solution.units, solution.variants
+    header, columns = [], []
+    for name, axis in given.items():
+        unit, factor = shown_unit(units.get(name, ""), angle_unit)
+        header.append(titled(name, unit))
+        columns.append([f"{factor * value:g}" for value in axis])
+    counts = [f"{found.sum()} of {found.size}" for found in solution.good]
+    header, columns = [*header, "points found"], [*columns, counts]
+    for name in solution.observed.names or solution.coordinates:
+        column = solution.column(name).shown(angle_unit)
+        for word, extreme in (("min", np.fmin), ("max", np.fmax)):
+            header.append(titled(f"{column.name} {word}", column.unit))
+            columns.append([_text(value) for value in extreme.reduce(column.values, axis=-1)])
+    return table(header, [*zip(*columns, strict=True)], right=header)
+
+
+def variant_named(solution: Solution, number: int) -> str:
+    """Return the values of a variant's parameters, as ``c = 270 mm``."""
     values = ((name, axis[number]) for name, axis in solution.variants.items())
-    named = (
-        f"{name} = {value:g} {solution.units.get(name, '')}".rstrip() for name, value in values
+    return ", ".join(
+        f"{name} = {x:g} {solution.units.get(name, '')}".rstrip() for name, x in values
     )
-    return f"{', '.join(named)}\n{summary(solution.variant(number), angle_unit)}"
 
 
 def _table(solution: Solution, angle_unit: str) -> list[str]:

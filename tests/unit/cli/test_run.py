@@ -177,3 +177,47 @@ def test_that_a_motion_goes_through_a_bifurcation_where_it_is_told_to(process, t
     # Opposite sides stay parallel.
     for row in rows_of(table):
         assert float(row["phi_k"]) == pytest.approx(1 + float(row["t"]), abs=1e-9)
+
+
+def test_that_a_sweep_says_why_each_variant_ended(kincompile, tmp_path):
+    """A crank of four bars that can go round up to a length of 1.5, and not beyond."""
+    path = tmp_path / "bars.toml"
+    path.write_text(BARS)
+    done = kincompile("run", path, "--sweep", "r=1.4:2.2:3")
+    head, *rows = done.stdout.splitlines()
+    assert head.split()[:5] == ["r", "[m]", "points", "found", "tip"]
+    assert [row.split()[0] for row in rows] == ["1.4", "1.8", "2.2"]
+    assert rows[0].split()[1:4] == ["41", "of", "41"]
+    assert int(rows[2].split()[1]) < int(rows[1].split()[1]) < 41
+    first, *reasons = done.stderr.splitlines()
+    assert (done.exit_code, first) == (3, "Error: 2 of 3 variants ended before the last time.")
+    assert [line.split(":")[0] for line in reasons] == ["r = 1.8 m", "r = 2.2 m"]
+    assert all("Lock-up at t = " in line for line in reasons)
+
+
+BARS = """
+kincompile = 1
+name = "bars"
+analysis = { end = 1.0, points = 41 }
+outputs = [{ name = "tip", expression = "y_B", unit = "m" }]
+[sketch]
+lengths = { r = 1.0 }
+ground = { O = [0, 0], C = [4, 0] }
+joints = { A = [1, 0], B = [4, 3] }
+parts = [
+    { link = "crank", joints = "O A", length = "r" },
+    { link = "coupler", joints = "A B", length = 3.5 },
+    { link = "rocker", joints = "C B", length = 2 },
+    { drive = "crank", value = "2*pi*t" },
+]
+"""
+
+
+def test_that_outputs_come_before_coordinates(kincompile, tmp_path):
+    path = tmp_path / "bars.toml"
+    path.write_text(BARS)
+    done = kincompile("run", path, "--points", "5")
+    titles = [line.split()[0] for line in done.stdout.splitlines() if line]
+    assert [x for x in titles if x in ("output", "coordinate", "driver")] == [
+        "output", "coordinate", "driver",
+    ]  # fmt: skip

@@ -142,11 +142,13 @@ def test_that_run_sweeps(example_named, tmp_path):
     example, path = example_named("four_bar"), tmp_path / "sweep.csv"
     done = run(example, "--points", "20", "--sweep", "a=9:11:3")
     assert done.exit_code == 0
-    assert [line for line in done.stdout.splitlines() if line.startswith("a = ")] == [
-        "a = 9 m",
-        "a = 10 m",
-        "a = 11 m",
-    ]
+    head, *rows = done.stdout.splitlines()
+    assert head.split()[:5] == ["a", "[m]", "points", "found", head.split()[4]]
+    assert [row.split()[:4] for row in rows] == [[a, "20", "of", "20"] for a in ("9", "10", "11")]
+    model = kc.read_model(example.path)
+    t = np.linspace(0, model.end, 20)
+    least = kc.solve(kc.compile(model), t, {"a": 10.0})[head.split()[4]].min()
+    assert float(rows[1].split()[4]) == pytest.approx(least, rel=1e-5)
     sweeps = ("--sweep", "a=9:11:3", "--sweep", "b=24:26:2")
     done = run(example, "--points", "20", *sweeps, "--product", "-o", str(path))
     assert (done.exit_code, len(path.read_text().splitlines())) == (0, 1 + 6 * 20)
