@@ -78,6 +78,9 @@ from kincompile.runtime.statics.equilibrium import equilibrium as equilibrium
 from kincompile.runtime.statics.flywheel import Flywheel as Flywheel
 from kincompile.runtime.statics.flywheel import flywheel as flywheel
 from kincompile.runtime.status import Status as Status
+from kincompile.runtime.stepper import Instant as Instant
+from kincompile.runtime.stepper import Stepper as Stepper
+from kincompile.runtime.stepper import stepper as stepper
 from kincompile.runtime.times import times_at as times_at
 from kincompile.sweeps.result import Sweep as Sweep
 from kincompile.sweeps.sweep import sweep as sweep

@@ -51,6 +51,8 @@ def makers_of(
         makers[kinds.UNDRIVEN] = partial(_undriven, system)
     if not isinstance(code, InlineProgram):  # that of a large mechanism is not worth its memory
         return makers
+    if compiled.lanes is not None and compiled.stepper is None:
+        makers[kinds.STEPPER] = partial(_stepper, compiled.module, code.program)
     makers[kinds.SENSITIVITIES] = partial(_sensitivities, code, compiled.module, target)
     makers[kinds.SENSITIVE] = partial(_with_sensitivities, code.program)
     if system.loads:
@@ -59,6 +61,15 @@ def makers_of(
         makers[kinds.DYNAMICS] = partial(_dynamics, code, system, target)
         makers[kinds.SLOPES] = partial(_slopes, compiled, code, target)
     return makers
+
+
+def _stepper(module: ModuleType, program: Program) -> Callable[..., Any]:
+    """Return what takes a motion from one time to the next, of the march that ends a file."""
+    from kincompile.emitters.numpy.march import march_of
+    from kincompile.runtime.load import with_text
+
+    found: Callable[..., Any] = with_text(module, march_of(program), "march")["stepper"]
+    return found
 
 
 def _joints(system: ConstraintSystem) -> dict[str, tuple[str, ...]]:

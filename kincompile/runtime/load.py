@@ -135,6 +135,13 @@ def _fill(module: ModuleType, filename: str, source: str) -> ModuleType:
     return module
 
 
+def with_text(module: ModuleType, text: str, what: str) -> Mapping[str, Any]:
+    """Run more text of a module, which stays as it is; return all names then."""
+    names = dict(vars(module))
+    exec(compile(text, f"<kincompile {module.__name__}, {what}>", "exec"), names)
+    return names
+
+
 def check(module: ModuleType) -> None:
     """Check that a module keeps the contract, and make it raise the package's `InputError`.
 

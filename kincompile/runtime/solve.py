@@ -264,7 +264,7 @@ def _after_corners(inputs: Inputs, corners: Mask | None) -> Inputs:
     if corners is None:
         return inputs
     everywhere = corners.reshape(-1, inputs.t.size).all(axis=0)
-    return replace(inputs, t=np.where(everywhere, inputs.t + _reach(inputs.t), inputs.t))
+    return replace(inputs, t=np.where(everywhere, inputs.t + reach_of(inputs.t), inputs.t))
 
 
 def _with_corners(solution: Solution, t: Array, corners: Mask) -> Solution:
@@ -285,18 +285,24 @@ def _corners(inputs: Inputs, p: Array) -> Mask:
     """Return where nu jumps, with one parameter set."""
     code, t, q = inputs.code, inputs.t, inputs.guess
     largest = np.zeros(len(code.equations))
-    jumps, reach = [], _reach(t)
-    size = max(1, ENTRIES // largest.size)
-    with np.errstate(all="ignore"):  # the guess may lie where an equation has no value
-        for first in range(0, t.size, size):
-            times = t[first : first + size]
-            before, after = (code.nu(q, times + side * reach, p) for side in (-1, 1))
-            largest = np.fmax(largest, np.fmax.reduce(np.fmax(np.abs(before), np.abs(after))))
-            jumps.append(np.abs(after - before))
-    return np.asarray((np.concatenate(jumps) > criteria.CORNER * largest).any(axis=1))
+    size, reach = max(1, ENTRIES // largest.size), reach_of(t)
+    parts = [t[first : first + size] for first in range(0, t.size, size)]
+    jumps = np.concatenate([jumps_of_nu(code, q, part, p, reach, largest) for part in parts])
+    return np.asarray((jumps > criteria.CORNER * largest).any(axis=1))
 
 
-def _reach(t: Array) -> float:
+def jumps_of_nu(
+    code: Compiled, q: Array, t: Array, p: Array, reach: float, largest: Array
+) -> Array:
+    """Return by how much nu jumps at times (N,), (N, m), and note its largest values (m,)."""
+    with np.errstate(all="ignore"):  # the position may lie where an equation has no value
+        before, after = (code.nu(q, t + side * reach, p) for side in (-1, 1))
+        sizes = np.fmax(np.abs(before), np.abs(after))
+        np.fmax(largest, np.fmax.reduce(sizes), out=largest)
+        return np.abs(np.asarray(after - before))
+
+
+def reach_of(t: Array) -> float:
     """Return how far two times may be apart that differ by rounding alone."""
     return criteria.SAME_TIME * float(np.abs(t).max())
 
@@ -341,20 +347,24 @@ def start_of_first(inputs: Inputs, solution: Solution) -> str:
 
 def solution_of(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
     """Put names, parameters and a verdict to the numbers, and warn of what was passed."""
-    code = inputs.code
-    success = outcome.status is Status.CONVERGED
-    for event in motion.passed:
-        text = f"{code.name} goes through a bifurcation at t = {event.t:.10g}, and on"
-        warnings.warn(f"{text} along the smooth branch.", BranchSwitchWarning, stacklevel=4)
-    if motion.near and success:
-        warnings.warn(_nearly(inputs, motion.near), SingularConfigurationWarning, stacklevel=4)
+    warn(inputs, motion, outcome, 5)
     return Solution(
-        success=success,
-        message=_verdict(inputs, motion, outcome) + motion.note,
+        success=outcome.status is Status.CONVERGED,
+        message=verdict(inputs, motion, outcome) + motion.note,
         t=inputs.t,
         **motion.fields(),
         **inputs.about(),
     )
+
+
+def warn(inputs: Inputs, motion: Motion, outcome: Outcome, level: int) -> None:
+    """Warn of what a motion passed; the level is that of `warnings.warn`."""
+    for event in motion.passed:
+        text = f"{inputs.code.name} goes through a bifurcation at t = {event.t:.10g}, and on"
+        text += " along the smooth branch."
+        warnings.warn(text, BranchSwitchWarning, stacklevel=level)
+    if motion.near and outcome.status is Status.CONVERGED:
+        warnings.warn(_nearly(inputs, motion.near), SingularConfigurationWarning, stacklevel=level)
 
 
 def _nearly(inputs: Inputs, near: list[int]) -> str:
@@ -367,7 +377,7 @@ def _nearly(inputs: Inputs, near: list[int]) -> str:
     )
 
 
-def _verdict(inputs: Inputs, motion: Motion, outcome: Outcome) -> str:
+def verdict(inputs: Inputs, motion: Motion, outcome: Outcome) -> str:
     """Say in words how a motion went; the outcome is that of the last point that was tried."""
     name, times, events = inputs.code.name, inputs.t, motion.events
     if outcome.status is Status.CONVERGED:

@@ -264,6 +264,45 @@ def march(m: Variants) -> Count:
     return done
 
 
+def set_out(m: Variants, b: Point, at: State, s: Scales) -> Int:
+    """Assemble a motion that is followed one time after the other; return the status.
+
+    The good point is then the one at the first time.
+    """
+    o = Outcome()
+    assemble(m, b, s, 0, 1, o)
+    take_up(at, b, 0)
+    return o.status[0]
+
+
+def go_on(b: Point, at: State, s: Scales, t: Real, p: Row[K]) -> Int:
+    """Take a good point to a time, with parameters near its own; return the status.
+
+    Where one step does not lead there, it goes with its own parameters, in sub-steps, and takes the
+    others then. A point that does not get there stays where it is.
+    """
+    o = Outcome()
+    o.is_over[0] = False
+    put_at(b, at, 0, 1)
+    has_own: Bool = True
+    for i in range(K):
+        has_own = has_own and p[i] == b.p[i][0]
+        b.p[i][0] = p[i]
+    step(b, s, t, o, lanes=1)
+    if o.status[0] != CONVERGED:
+        way = State()
+        put_at(b, at, 0, 1)
+        take_up(way, b, 0)
+        advance(b, s, way, t, 0, o)
+        if o.status[0] == CONVERGED and not has_own:
+            for i in range(K):
+                b.p[i][0] = p[i]
+            step(b, s, t, o, lanes=1)
+    if o.status[0] == CONVERGED:
+        take_up(at, b, 0)
+    return o.status[0]
+
+
 def put_to_rest(m: Variants, b: Point, o: Outcome, first: Count, count: Count):
     """Let the variants that failed at a time rest at the guess, where they disturb no others."""
     for k in lanes(count):

@@ -33,12 +33,12 @@ from kincompile.names import listed
 
 ROOT = Path(__file__).resolve().parents[2]
 RUN = {
-    "README.md": 9, "docs/modelling.md": 7, "docs/emitted_modules.md": 9, "docs/errors.md": 3,
+    "README.md": 9, "docs/modelling.md": 7, "docs/emitted_modules.md": 10, "docs/errors.md": 3,
     "docs/command_line.md": 4, "docs/motion_laws.md": 8, "docs/checker.md": 7,
     "docs/forces.md": 5, "docs/dynamics.md": 7, "docs/sensitivities.md": 2,
     "docs/transmissions.md": 10, "docs/other_programs.md": 14, "docs/fmi.md": 8,
     "docs/tolerances.md": 4, "docs/space.md": 5, "docs/synthesis.md": 4,
-    "docs/sweeps.md": 9, "docs/in_c.md": 13, "docs/in_javascript.md": 13,
+    "docs/sweeps.md": 9, "docs/stepper.md": 3, "docs/in_c.md": 13, "docs/in_javascript.md": 13,
     "docs/in_rust.md": 6, "docs/in_octave.md": 9,
     "docs/course/museum.md": 19, "docs/explanation/newton.md": 4, "docs/explanation/signs.md": 4,
 }  # fmt: skip

@@ -74,7 +74,7 @@ def files(
     body = [_strip(code, lines, called, listing)]
     body.append(fill("c/batch.c.jinja", {**_only(about, "name", "is_planned"), **_batch(code)}))
     if listing is not None:
-        body.append(fill("c/march.c.jinja", {"name": program.name, **_march(program)}))
+        body.append(fill("c/march.c.jinja", {**_only(about, "name", "NAME"), **_march(program)}))
     data = {**_without(about, "NAME"), **_tables(code, listing), "body": "".join(body)}
     source = fill("c/module.c.jinja", data)
     guard = f"{program.name.upper()}_H"

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 FUNCTIONS_BY_HAND = (
     "measure", "speed_of", "until_lock_up", "locks_up", "scales_of", "advance", "record",
-    "put_at_guesses", "assemble", "march", "put_to_rest", "follow_variants", "march_variants",
-    "position_from",
+    "put_at_guesses", "assemble", "march", "set_out", "go_on", "put_to_rest", "follow_variants",
+    "march_variants", "position_from",
 )  # fmt: skip
 """Functions that are not printed: what is kept of a motion, and its events, are written by hand."""
 STRUCTS_BY_HAND = ("State", "Point", "Scales", "Variants")

@@ -218,6 +218,11 @@ def with_march(emitted: Emitted, program: Program) -> Emitted:
     """
     if "\ndef solve(" not in emitted.source:
         return emitted
+    return replace(emitted, files={f"{emitted.name}.py": emitted.source + march_of(program)})
+
+
+def march_of(program: Program) -> str:
+    """Return the text of a march, which ends a module."""
     (text, numbers), tables = _solver(), solver_tables(program)
     slots = {name.lower(): tuple_text(map(repr, tables[name])) for name in TABLES} | {
         "n": len(program.coordinates),
@@ -227,5 +232,4 @@ def with_march(emitted: Emitted, program: Program) -> Emitted:
         "tolerance": criteria.TOLERANCE,
         "most": criteria.MAX_ITERATIONS,
     }
-    march = fill("numpy/march.py.jinja", slots)
-    return replace(emitted, files={f"{emitted.name}.py": emitted.source + march})
+    return fill("numpy/march.py.jinja", slots)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         If,
         Statement,
         Struct,
+        Text,
         Type,
         Variable,
     )
@@ -32,6 +33,8 @@ SIZES = {"N": "N_COORDINATES", "M": "N_EQUATIONS", "K": "N_PARAMETERS"}
 GIVEN = ("Point", "Variants")
 """Structs that the templates write."""
 PUBLIC = ("march", "march_variants")
+OF_STEPPER = ("set_out", "go_on")
+"""Functions that are left out: a caller who asks for one time after the other is not served yet."""
 
 
 class RustSolver(OneLane):
@@ -41,6 +44,10 @@ class RustSolver(OneLane):
         "abs": "abs", "finite": "is_finite", "floor": "floor", "max": "max", "min": "min",
         "sqrt": "sqrt",
     }  # fmt: skip
+
+    def __init__(self, text: Text) -> None:
+        super().__init__(text)
+        self.functions = {k: x for k, x in self.functions.items() if k not in OF_STEPPER}
 
     def kind(self, kind: Type) -> str:
         """Return a type; a large matrix is not on the stack."""

@@ -131,6 +131,9 @@ class Compiled:
     attempts: Callable[..., NDArray[np.bool_]] | None
     mirror: Callable[..., Array] | None
     lead: Callable[..., tuple[Array, NDArray[np.intc]]] | None
+    # Of a compiled module, or one whose file ends with a march: takes a motion from one time to the
+    # next.
+    stepper: Callable[..., Callable[..., tuple[Array, int]]] | None
     # Of a module with outputs: puts them and their rates at states (n, N) into (3, r, N).
     observe_into: Callable[..., None] | None
     # Of a module with outputs: gives them at one state of plain floats, (q, q_dot, q_ddot, t, p);
@@ -212,6 +215,9 @@ class Dynamics:
 
 POINTS: Kind[Compiled] = Kind("points")
 """Without equations; its outputs are the points of the joints."""
+
+STEPPER: Kind[Callable[..., Callable[..., tuple[Array, int]]]] = Kind("stepper")
+"""Of a module that has none: takes a motion from one time to the next."""
 
 UNDRIVEN: Kind[str] = Kind("undriven")
 """Which drivers are missing, "" if none are."""
@@ -348,6 +354,7 @@ def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compi
         attempts=names.get("compiled_attempts"),
         mirror=names.get("compiled_mirror"),
         lead=names.get("compiled_lead"),
+        stepper=names.get("compiled_stepper", names.get("stepper")),
         observe_into=_observing(names, lanes),
         observe_floats=observe and partial(observe, names["FLOATS"]),
         origin=names.get(ORIGIN),

@@ -35,6 +35,7 @@ from kincompile.runtime.native.points import (
     numbers_of_batch,
     numbers_of_times,
 )
+from kincompile.runtime.native.stepper import stepper_of
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
         compiled["compiled_attempts"] = functions.attempts()
         compiled["compiled_mirror"] = functions.mirror()
         compiled["compiled_lead"] = functions.lead()
+        compiled["compiled_stepper"] = stepper_of(code, loaded)
         lanes = names["LANES"]
         names["LANES"] = {**lanes, "position": functions.position_of_lanes(lanes["position"])}
     if "observe" in names:
