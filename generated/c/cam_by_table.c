@@ -1471,6 +1471,46 @@ static size_t march(const cam_by_table_variants *m)
     return done;
 }
 
+// Assemble a motion that is followed one time after the other; return the status. The good point
+// is then the one at the first time.
+static int set_out(const cam_by_table_variants *m, strip *b, state *at, scales *s)
+{
+    outcome o;
+    assemble(m, b, s, 0, 1, &o);
+    take_up(at, b, 0);
+    return o.status[0];
+}
+
+// Take a good point to a time, with parameters near its own; return the status. Where one step
+// does not lead there, it goes with its own parameters, in sub-steps, and takes the others then. A
+// point that does not get there stays where it is.
+static int go_on(strip *b, state *at, const scales *s, double t, const double *p)
+{
+    outcome o;
+    o.is_over[0] = 0;
+    put_at(b, at, 0, 1);
+    int has_own = 1;
+    for (int i = 0; i < K; i++) {
+        has_own = has_own && p[i] == b->p[i][0];
+        b->p[i][0] = p[i];
+    }
+    step(b, s, &t, &o, 1);
+    if (o.status[0] != CAM_BY_TABLE_CONVERGED) {
+        state way;
+        put_at(b, at, 0, 1);
+        take_up(&way, b, 0);
+        advance(b, s, &way, t, 0, &o);
+        if (o.status[0] == CAM_BY_TABLE_CONVERGED && !has_own) {
+            for (int i = 0; i < K; i++)
+                b->p[i][0] = p[i];
+            step(b, s, &t, &o, 1);
+        }
+    }
+    if (o.status[0] == CAM_BY_TABLE_CONVERGED)
+        take_up(at, b, 0);
+    return o.status[0];
+}
+
 // Let the variants that failed at a time rest at the guess, where they disturb no others.
 static void put_to_rest(const cam_by_table_variants *m, strip *b, outcome *o, size_t first,
     size_t count)
@@ -1868,7 +1908,8 @@ void cam_by_table_lead_variants(const cam_by_table_variants *m, cam_by_table_inp
     }
 }
 
-size_t cam_by_table_march(const cam_by_table_motion *motion)
+// One motion, as the solver has it.
+static cam_by_table_variants one_of(const cam_by_table_motion *motion)
 {
     const cam_by_table_variants m = {
         .count = motion->count, .t = motion->t, .p = { motion->p, 1, 0 },
@@ -1877,7 +1918,40 @@ size_t cam_by_table_march(const cam_by_table_motion *motion)
         .q = motion->q, .q_dot = motion->q_dot, .q_ddot = motion->q_ddot,
         .residual = motion->residual, .status = motion->status, .iterations = motion->iterations,
     };
+    return m;
+}
+
+size_t cam_by_table_march(const cam_by_table_motion *motion)
+{
+    const cam_by_table_variants m = one_of(motion);
     return march(&m);
+}
+
+// A good point, by what it is judged, and where the next one is computed.
+struct cam_by_table_stepper {
+    state at;
+    scales s;
+    strip b;
+};
+
+size_t cam_by_table_stepper_size(void)
+{
+    return sizeof(cam_by_table_stepper);
+}
+
+int cam_by_table_set_out(cam_by_table_stepper *stepper, const cam_by_table_motion *motion)
+{
+    const cam_by_table_variants m = one_of(motion);
+    return set_out(&m, &stepper->b, &stepper->at, &stepper->s);
+}
+
+int cam_by_table_go_on(cam_by_table_stepper *stepper, double t, const double *p, double *q)
+{
+    const int status = go_on(&stepper->b, &stepper->at, &stepper->s, t, p);
+    const double *from = &stepper->at.t + offsetof(strip, q) / sizeof(double[LANES]);
+    for (int i = 0; i < 3 * N; i++)
+        q[i] = status == CAM_BY_TABLE_CONVERGED ? from[i] : NAN;
+    return status;
 }
 
 // The start: who brings one's own leaves it out of the library.

@@ -130,6 +130,19 @@ typedef struct {
 // Follow a motion; returns how many points converged, from the first one on.
 size_t cam_by_table_march(const cam_by_table_motion *motion);
 
+// A motion that is followed one time after the other, as a control loop asks for them. Its memory, of
+// cam_by_table_stepper_size() bytes, is the caller's: aligned as malloc does.
+typedef struct cam_by_table_stepper cam_by_table_stepper;
+size_t cam_by_table_stepper_size(void);
+
+// Start it at the first time of a motion; returns the status. Nothing is written to the motion's arrays.
+int cam_by_table_set_out(cam_by_table_stepper *stepper, const cam_by_table_motion *motion);
+
+// Go on to a time, later or earlier, by parts of the way where need be; p are 1 parameters, the
+// same or near those of before. Writes q, q_dot and q_ddot, 3 x 7 numbers; returns the status. If it is
+// not CAM_BY_TABLE_CONVERGED, numbers are NaN, and the motion stands where it stood.
+int cam_by_table_go_on(cam_by_table_stepper *stepper, double t, const double *p, double *q);
+
 // The motions of many variants, each with parameters and a guess of its own. Of q, q_dot and
 // q_ddot, entry i of variant v at time j is first[i * entry + v * point + j * time]; of residual,
 // status and iterations it is [j * variants + v]. A variant that fails has the status at that time,

@@ -1497,6 +1497,46 @@ static size_t march(const four_bar_variants *m)
     return done;
 }
 
+// Assemble a motion that is followed one time after the other; return the status. The good point
+// is then the one at the first time.
+static int set_out(const four_bar_variants *m, strip *b, state *at, scales *s)
+{
+    outcome o;
+    assemble(m, b, s, 0, 1, &o);
+    take_up(at, b, 0);
+    return o.status[0];
+}
+
+// Take a good point to a time, with parameters near its own; return the status. Where one step
+// does not lead there, it goes with its own parameters, in sub-steps, and takes the others then. A
+// point that does not get there stays where it is.
+static int go_on(strip *b, state *at, const scales *s, double t, const double *p)
+{
+    outcome o;
+    o.is_over[0] = 0;
+    put_at(b, at, 0, 1);
+    int has_own = 1;
+    for (int i = 0; i < K; i++) {
+        has_own = has_own && p[i] == b->p[i][0];
+        b->p[i][0] = p[i];
+    }
+    step(b, s, &t, &o, 1);
+    if (o.status[0] != FOUR_BAR_CONVERGED) {
+        state way;
+        put_at(b, at, 0, 1);
+        take_up(&way, b, 0);
+        advance(b, s, &way, t, 0, &o);
+        if (o.status[0] == FOUR_BAR_CONVERGED && !has_own) {
+            for (int i = 0; i < K; i++)
+                b->p[i][0] = p[i];
+            step(b, s, &t, &o, 1);
+        }
+    }
+    if (o.status[0] == FOUR_BAR_CONVERGED)
+        take_up(at, b, 0);
+    return o.status[0];
+}
+
 // Let the variants that failed at a time rest at the guess, where they disturb no others.
 static void put_to_rest(const four_bar_variants *m, strip *b, outcome *o, size_t first,
     size_t count)
@@ -1893,7 +1933,8 @@ void four_bar_lead_variants(const four_bar_variants *m, four_bar_input ends)
     }
 }
 
-size_t four_bar_march(const four_bar_motion *motion)
+// One motion, as the solver has it.
+static four_bar_variants one_of(const four_bar_motion *motion)
 {
     const four_bar_variants m = {
         .count = motion->count, .t = motion->t, .p = { motion->p, 1, 0 },
@@ -1902,7 +1943,40 @@ size_t four_bar_march(const four_bar_motion *motion)
         .q = motion->q, .q_dot = motion->q_dot, .q_ddot = motion->q_ddot,
         .residual = motion->residual, .status = motion->status, .iterations = motion->iterations,
     };
+    return m;
+}
+
+size_t four_bar_march(const four_bar_motion *motion)
+{
+    const four_bar_variants m = one_of(motion);
     return march(&m);
+}
+
+// A good point, by what it is judged, and where the next one is computed.
+struct four_bar_stepper {
+    state at;
+    scales s;
+    strip b;
+};
+
+size_t four_bar_stepper_size(void)
+{
+    return sizeof(four_bar_stepper);
+}
+
+int four_bar_set_out(four_bar_stepper *stepper, const four_bar_motion *motion)
+{
+    const four_bar_variants m = one_of(motion);
+    return set_out(&m, &stepper->b, &stepper->at, &stepper->s);
+}
+
+int four_bar_go_on(four_bar_stepper *stepper, double t, const double *p, double *q)
+{
+    const int status = go_on(&stepper->b, &stepper->at, &stepper->s, t, p);
+    const double *from = &stepper->at.t + offsetof(strip, q) / sizeof(double[LANES]);
+    for (int i = 0; i < 3 * N; i++)
+        q[i] = status == FOUR_BAR_CONVERGED ? from[i] : NAN;
+    return status;
 }
 
 // The start: who brings one's own leaves it out of the library.

@@ -132,6 +132,19 @@ typedef struct {
 // Follow a motion; returns how many points converged, from the first one on.
 size_t four_bar_march(const four_bar_motion *motion);
 
+// A motion that is followed one time after the other, as a control loop asks for them. Its memory, of
+// four_bar_stepper_size() bytes, is the caller's: aligned as malloc does.
+typedef struct four_bar_stepper four_bar_stepper;
+size_t four_bar_stepper_size(void);
+
+// Start it at the first time of a motion; returns the status. Nothing is written to the motion's arrays.
+int four_bar_set_out(four_bar_stepper *stepper, const four_bar_motion *motion);
+
+// Go on to a time, later or earlier, by parts of the way where need be; p are 5 parameters, the
+// same or near those of before. Writes q, q_dot and q_ddot, 3 x 9 numbers; returns the status. If it is
+// not FOUR_BAR_CONVERGED, numbers are NaN, and the motion stands where it stood.
+int four_bar_go_on(four_bar_stepper *stepper, double t, const double *p, double *q);
+
 // The motions of many variants, each with parameters and a guess of its own. Of q, q_dot and
 // q_ddot, entry i of variant v at time j is first[i * entry + v * point + j * time]; of residual,
 // status and iterations it is [j * variants + v]. A variant that fails has the status at that time,

@@ -124,6 +124,19 @@ typedef struct {
 // Follow a motion; returns how many points converged, from the first one on.
 size_t problem_3_5_6_march(const problem_3_5_6_motion *motion);
 
+// A motion that is followed one time after the other, as a control loop asks for them. Its memory, of
+// problem_3_5_6_stepper_size() bytes, is the caller's: aligned as malloc does.
+typedef struct problem_3_5_6_stepper problem_3_5_6_stepper;
+size_t problem_3_5_6_stepper_size(void);
+
+// Start it at the first time of a motion; returns the status. Nothing is written to the motion's arrays.
+int problem_3_5_6_set_out(problem_3_5_6_stepper *stepper, const problem_3_5_6_motion *motion);
+
+// Go on to a time, later or earlier, by parts of the way where need be; p are 0 parameters, the
+// same or near those of before. Writes q, q_dot and q_ddot, 3 x 3 numbers; returns the status. If it is
+// not PROBLEM_3_5_6_CONVERGED, numbers are NaN, and the motion stands where it stood.
+int problem_3_5_6_go_on(problem_3_5_6_stepper *stepper, double t, const double *p, double *q);
+
 // The motions of many variants, each with parameters and a guess of its own. Of q, q_dot and
 // q_ddot, entry i of variant v at time j is first[i * entry + v * point + j * time]; of residual,
 // status and iterations it is [j * variants + v]. A variant that fails has the status at that time,

@@ -130,6 +130,19 @@ typedef struct {
 // Follow a motion; returns how many points converged, from the first one on.
 size_t slider_crank_march(const slider_crank_motion *motion);
 
+// A motion that is followed one time after the other, as a control loop asks for them. Its memory, of
+// slider_crank_stepper_size() bytes, is the caller's: aligned as malloc does.
+typedef struct slider_crank_stepper slider_crank_stepper;
+size_t slider_crank_stepper_size(void);
+
+// Start it at the first time of a motion; returns the status. Nothing is written to the motion's arrays.
+int slider_crank_set_out(slider_crank_stepper *stepper, const slider_crank_motion *motion);
+
+// Go on to a time, later or earlier, by parts of the way where need be; p are 0 parameters, the
+// same or near those of before. Writes q, q_dot and q_ddot, 3 x 9 numbers; returns the status. If it is
+// not SLIDER_CRANK_CONVERGED, numbers are NaN, and the motion stands where it stood.
+int slider_crank_go_on(slider_crank_stepper *stepper, double t, const double *p, double *q);
+
 // The motions of many variants, each with parameters and a guess of its own. Of q, q_dot and
 // q_ddot, entry i of variant v at time j is first[i * entry + v * point + j * time]; of residual,
 // status and iterations it is [j * variants + v]. A variant that fails has the status at that time,

@@ -673,6 +673,47 @@ def march(q, t, p=DEFAULTS, size=None):
     the mechanism, in its unit of length, by which errors are judged: by default the longest one
     that Phi_q shows at q.
     """
+    m, count = _motion(q, t, p, size), np.size(t)
+    m.q, m.q_dot, m.q_ddot = np.full((3, count, N_COORDINATES), math.nan)
+    m.status, m.iterations, m.residual = [0] * count, [0] * count, [0.0] * count
+    with np.errstate(all="ignore"):
+        reached = _march(m)
+    for rows in (m.q, m.q_dot, m.q_ddot):
+        rows[reached:] = math.nan
+    return m.q, m.q_dot, m.q_ddot, np.array(m.status)
+
+
+def stepper(q, t, p=DEFAULTS, size=None):
+    """Return a function that takes a motion from one time to the next, as a control loop asks.
+
+    The motion starts at one time t, as `march` does. Then ``(q, q_dot, q_ddot), status = go(t, p)``
+    is where it is at another one, later or earlier; it goes there from where it stands, by parts of
+    the way where need be. p are by default those of the start; others must be near those of before.
+    The status is as that of `march`: if it is above 0, the numbers are NaN, and the motion stands
+    where it stood.
+    """
+    m, b, at, s = _motion(q, [t], p, size), _Point(), _State(), _Scales()
+    with np.errstate(all="ignore"):
+        begun = _set_out(m, b, at, s)
+
+    def go(t, p=p):
+        t, p = _checked("t", t), _checked("p", p, PARAMETERS)
+        if (t.ndim, p.ndim) != (0, 1) or np.result_type(t, p) != _REAL:
+            raise InputError(
+                f"{NAME}: a step takes one time t and parameters p ({len(PARAMETERS)},), "
+                "real numbers"
+            )
+        with np.errstate(all="ignore"):
+            status = begun or _go_on(b, at, s, float(t), p.tolist())
+        if status:
+            return np.full((3, N_COORDINATES), math.nan), status
+        return np.array((at.q, at.q_dot, at.q_ddot)), status
+
+    return go
+
+
+def _motion(q, t, p, size):
+    """Return what a march is given, checked."""
     t, q, p = _checked("t", t), _checked("q", q, COORDINATES), _checked("p", p, PARAMETERS)
     if (t.ndim, q.ndim, p.ndim) != (1, 1, 1) or not t.size or np.result_type(t, q, p) != _REAL:
         raise InputError(
@@ -682,16 +723,10 @@ def march(q, t, p=DEFAULTS, size=None):
     size = _size(q, t[0], p) if size is None else float(size)
     if not 0.0 < size < math.inf:
         raise InputError(f"{NAME}: the size of a mechanism is a length above 0, not {size}")
-    m, count = _Variants(), t.size
-    m.count, m.t, m.p, m.guess, m.size = count, t.tolist(), [p.tolist()], [q.tolist()], size
+    m = _Variants()
+    m.count, m.t, m.p, m.guess, m.size = t.size, t.tolist(), [p.tolist()], [q.tolist()], size
     m.tolerance, m.max_iterations = 1e-10, 25
-    m.q, m.q_dot, m.q_ddot = np.full((3, count, N_COORDINATES), math.nan)
-    m.status, m.iterations, m.residual = [0] * count, [0] * count, [0.0] * count
-    with np.errstate(all="ignore"):
-        reached = _march(m)
-    for rows in (m.q, m.q_dot, m.q_ddot):
-        rows[reached:] = math.nan
-    return m.q, m.q_dot, m.q_ddot, np.array(m.status)
+    return m
 
 
 def _size(q, t, p):
@@ -755,7 +790,7 @@ def _missed_at(b, weight):
 
 def _copy(to, source):
     """Take up a point as a good one, or go back to it."""
-    to.t, to.p, to.q = source.t, source.p, list(source.q)
+    to.t, to.p, to.q = source.t, list(source.p), list(source.q)
     to.q_dot, to.q_ddot = list(source.q_dot), list(source.q_ddot)
     to.determinants = source.determinants
 
@@ -1150,6 +1185,45 @@ def _march(m):
     for k in range(done + 1, m.count):
         m.status[k] = _NOT_REACHED
     return done
+
+
+def _set_out(m, b, at, s):
+    """Assemble a motion that is followed one time after the other; return the status.
+
+    The good point is then the one at the first time.
+    """
+    o = _Outcome()
+    _assemble(m, b, s, 0, 1, o)
+    _copy(at, b)
+    return o.status
+
+
+def _go_on(b, at, s, t, p):
+    """Take a good point to a time, with parameters near its own; return the status.
+
+    Where one step does not lead there, it goes with its own parameters, in sub-steps, and takes the
+    others then. A point that does not get there stays where it is.
+    """
+    o = _Outcome()
+    o.is_over = False
+    _copy(b, at)
+    has_own = True
+    for i in range(len(PARAMETERS)):
+        has_own = has_own and p[i] == b.p[i]
+        b.p[i] = p[i]
+    _step(b, s, t, o)
+    if o.status != _CONVERGED:
+        way = _State()
+        _copy(b, at)
+        _copy(way, b)
+        _advance(b, s, way, t, 0, o)
+        if o.status == _CONVERGED and not has_own:
+            for i in range(len(PARAMETERS)):
+                b.p[i] = p[i]
+            _step(b, s, t, o)
+    if o.status == _CONVERGED:
+        _copy(at, b)
+    return o.status
 
 
 with np.errstate(all="ignore"):
