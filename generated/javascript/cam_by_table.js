@@ -13,7 +13,7 @@
 // 6    AbsoluteAngle "motor" (driver)  cam                Haug 3.2.6
 //
 // A classic script of a page: it declares cam_by_table. Under node, require() returns the same,
-// and import does. With one line more, "export default cam_by_table;", it is an ES module.
+// and import does. Written to a file that ends in .mjs it is an ES module.
 // The functions take one point: arrays q [7], q_dot [7] and p [1], and the time t. Vectors are
 // arrays, and Phi_q is an array of its rows.
 // solver.solve(cam_by_table, times, p, guess) gives the motion: q, q_dot and q_ddot, a time after

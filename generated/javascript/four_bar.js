@@ -14,7 +14,7 @@
 // 8    AbsoluteAngle "motor" (driver)  crank             Haug 3.2.6
 //
 // A classic script of a page: it declares four_bar. Under node, require() returns the same,
-// and import does. With one line more, "export default four_bar;", it is an ES module.
+// and import does. Written to a file that ends in .mjs it is an ES module.
 // The functions take one point: arrays q [9], q_dot [9] and p [5], and the time t. Vectors are
 // arrays, and Phi_q is an array of its rows.
 // solver.solve(four_bar, times, p, guess) gives the motion: q, q_dot and q_ddot, a time after

@@ -7,7 +7,7 @@
 // p     a [m], b [m], c [m], d [m], omega [rad/s]
 //
 // A classic script of a page: it declares four_bar_transmission. Under node, require() returns the same,
-// and import does. With one line more, "export default four_bar_transmission;", it is an ES module.
+// and import does. Written to a file that ends in .mjs it is an ES module.
 //
 //     const state = four_bar_transmission.start();
 //     const { x, J, status } = four_bar_transmission.transmission(state, u);

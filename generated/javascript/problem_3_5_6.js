@@ -10,7 +10,7 @@
 // 2    Equation "equation_3" (driver)    free equation
 //
 // A classic script of a page: it declares problem_3_5_6. Under node, require() returns the same,
-// and import does. With one line more, "export default problem_3_5_6;", it is an ES module.
+// and import does. Written to a file that ends in .mjs it is an ES module.
 // The functions take one point: arrays q [3], q_dot [3] and p [0], and the time t. Vectors are
 // arrays, and Phi_q is an array of its rows.
 // solver.solve(problem_3_5_6, times, p, guess) gives the motion: q, q_dot and q_ddot, a time after

@@ -19,7 +19,7 @@
 // 20     Normalization "norm_slider"        slider           Haug 9.3
 //
 // A classic script of a page: it declares spatial_slider_crank. Under node, require() returns the same,
-// and import does. With one line more, "export default spatial_slider_crank;", it is an ES module.
+// and import does. Written to a file that ends in .mjs it is an ES module.
 // The functions take one point: arrays q [21], q_dot [21] and p [3], and the time t. Vectors are
 // arrays, and Phi_q is an array of its rows.
 // solver.solve(spatial_slider_crank, times, p, guess) gives the motion: q, q_dot and q_ddot, a time after

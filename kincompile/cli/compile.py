@@ -72,7 +72,7 @@ def _destination(output: str, emitted: Emitted, target: str) -> tuple[Path, str]
     """Return the folder to write to, and the name there of the main file."""
     path = Path(output)
     usual = emitted.main
-    if path.is_dir() or (emitted.companions and not path.suffix):
+    if path.is_dir() or not path.suffix:
         return path, usual
     other = ENDINGS.get(path.suffix, target)
     if other != target:
@@ -80,7 +80,8 @@ def _destination(output: str, emitted: Emitted, target: str) -> tuple[Path, str]
             f"{path} is the name of a file for {other}, and the target is {target}; "
             f"give --target {other}, or end the name as {usual}"
         )
-    if path.name in emitted.companions:
+    beside = {Path(name).suffix for name in emitted.companions} - {Path(usual).suffix}
+    if path.name in emitted.companions or path.suffix in beside:
         raise InputError(f"{path} is the name of another file that is written; end it as {usual}")
     require_writable(path)
     return path.parent, path.name

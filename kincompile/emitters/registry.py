@@ -34,7 +34,7 @@ TARGETS = {
     ),
     "c": Listed("kincompile.emitters.c", (".c", ".h"), is_loadable=True, has_transmission=True),
     "octave": Listed("kincompile.emitters.octave", (".m",), has_transmission=True),
-    "javascript": Listed("kincompile.emitters.javascript", (".js",), has_transmission=True),
+    "javascript": Listed("kincompile.emitters.javascript", (".js", ".mjs"), has_transmission=True),
     "rust": Listed("kincompile.emitters.rust", (".rs",), has_transmission=True),
 }  # fmt: skip
 """Languages to emit."""

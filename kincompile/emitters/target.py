@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -83,7 +84,7 @@ class Emitted(Shown):
         folder
             Where to write.
         main
-            Another name for the main file.
+            Another name for the main file; JavaScript in one that ends in .mjs is an ES module.
 
         Raises
         ------
@@ -96,13 +97,19 @@ class Emitted(Shown):
         paths = []
         for k, (name, text) in enumerate(self.files.items()):
             path = Path(folder) / (main if main and k == 0 else name)
-            write_atomically(path, text)
+            write_atomically(path, text + _export(text) if path.suffix == ".mjs" else text)
             paths.append(path)
         if self.arrays:
             path = Path(folder) / self.companions[-1]
             write_atomically(path, _packed(self.arrays))
             paths.append(path)
         return tuple(paths)
+
+
+def _export(text: str) -> str:
+    """Return the line that exports from an ES module what a script gives to require()."""
+    found = re.search(r"module\.exports = (\w+);", text)
+    return f"\nexport default {found[1]};\n" if found else ""
 
 
 def _packed(arrays: Mapping[str, NDArray[Any]]) -> bytes:

@@ -23,6 +23,31 @@ def test_that_a_folder_gets_a_file_with_the_name_of_the_mechanism(kincompile, pe
 
 
 @pytest.mark.parametrize("target", TARGETS)
+def test_that_a_name_without_an_ending_is_a_folder(kincompile, pendulum, tmp_path, target):
+    """A file without an ending can be imported, required and compiled by nobody."""
+    assert (
+        kincompile("compile", pendulum, "--target", target, "-o", tmp_path / "src").exit_code == 0
+    )
+    written = {path.name for path in (tmp_path / "src").iterdir()}
+    assert written == {*kc.emit(kc.read_model(pendulum), target).files}
+
+
+def test_that_a_header_is_no_name_for_the_source(kincompile, pendulum, tmp_path):
+    done = kincompile("compile", pendulum, "--target", "c", "-o", tmp_path / "other.h")
+    assert done.exit_code == 2
+    assert "the name of another file that is written; end it as pendulum.c" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == [pendulum.name]
+
+
+@pytest.mark.parametrize("transmission", [None, (["motor"], ["phi_bob"])])
+def test_that_javascript_in_mjs_has_an_export(pendulum, tmp_path, transmission):
+    emitted = kc.emit(kc.read_model(pendulum), "javascript", transmission=transmission)
+    script, module = emitted.write(tmp_path)[0], emitted.write(tmp_path, "m.mjs")[0]
+    exported = f"\nexport default {script.stem};\n"
+    assert module.read_text() == script.read_text() + exported
+
+
+@pytest.mark.parametrize("target", TARGETS)
 def test_that_a_model_without_its_driver_is_written_with_a_warning(
     kincompile, pendulum, tmp_path, target
 ):
