@@ -200,15 +200,18 @@ def transmission_unit(
             f"a unit of {program.name} has no value of {listed(twists)}: a function of positions "
             "gives velocities a Jacobian alone. Leave it out of the outputs."
         )
-    starts = {x.name: x.default for x in program.parameters}
+    defaults = {x.name: x.default for x in program.parameters}
     given = _numbered(PARAMETER, 1, ((x.name, x.unit, x.default) for x in of.parameters))
     inputs = zip(of.titles, of.inputs, strict=True)
-    own = ((names.get(x, x), of.units[x], starts[name]) for x, name in inputs)
+    own = ((names.get(x, x), of.units[x], defaults[name]) for x, name in inputs)
     given += _numbered(INPUT, 1 + len(given), own)
     outputs = ((names.get(x, x), of.units[x], None) for x in of.outputs)
     given += _numbered(OUTPUT, 1 + len(given), outputs)
     about = f"The mechanism {program.name} as a function of its inputs"
-    data = {"smallest": repr(criteria.SMALLEST_PART)}
+    data = {
+        "near": repr(criteria.SMALL_ERROR),
+        "smallest": repr(criteria.SMALLEST_PART),
+    }
     return _unit(emitted, build, about, given, len(of.outputs), data, {"end": 0.0, "step": 0.0})
 
 
@@ -231,7 +234,7 @@ def _is_unknown(code: InlineProgram, node: int) -> bool:
 def _numbered(
     causality: str, first: int, given: Iterable[tuple[str, str, float | None]]
 ) -> list[_Variable]:
-    """Return variables of names, units and starts, in order."""
+    """Return variables of names, units and defaults, in order."""
     return [
         _Variable(name, k, causality, unit, None if causality == OUTPUT else float(start or 0.0))
         for k, (name, unit, start) in enumerate(given, first)
@@ -308,7 +311,7 @@ def _unit(
                 "inputs": inputs,
                 "outputs": outputs,
                 "names": indented(quoted(x.name for x in given)),
-                "starts": indented(wrapped([repr(x.start) for x in given])),
+                "defaults": indented(wrapped([repr(x.start) for x in given])),
                 "core": core,
                 "others": fill("fmi/others.c.jinja", {"name": emitted.name, "inputs": inputs}),
             },

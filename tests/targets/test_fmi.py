@@ -16,6 +16,7 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
+import sympy
 from click.testing import CliRunner
 from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
@@ -166,6 +167,8 @@ def test_the_same_model_gives_the_same_bytes(tmp_path, monkeypatch):
     with pytest.warns(KincompileWarning, match="its sources alone.*no C compiler was found"):
         first, second = (written(tmp_path, name, slider_crank()) for name in ("one", "two"))
     assert first.read_bytes() == second.read_bytes()
+    with zipfile.ZipFile(first) as archive:
+        assert {x.date_time for x in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
 
 
 def assert_outputs_are_those(path, f, amplitude):
@@ -186,9 +189,10 @@ def assert_outputs_are_those(path, f, amplitude):
             unit.step(0.05 * k, 0.05)
             outputs.append(unit.get(*found))
             places = [[unit.place[x] for x in names] for names in (found, given)]
-            slopes.append(
-                [unit.fmu.getDirectionalDerivative(places[0], [x], [1.0]) for x in places[1]]
-            )
+            slope, seed = unit.fmu.getDirectionalDerivative, [0.5, -2.0, 3.0][:inputs]
+            slopes.append([slope(places[0], [x], [1.0]) for x in places[1]])
+            along = slope(*places, seed)
+            np.testing.assert_allclose(along, np.transpose(slopes[-1]) @ seed, rtol=1e-14)
             adjoint = [
                 unit.fmu.getAdjointDerivative([x], places[1], [1.0], inputs) for x in places[0]
             ]
@@ -221,6 +225,22 @@ def test_a_transmission_with_other_parameters_is_on_the_branch_of_the_first(unit
             unit.begin()
             unit.put(motor=2.0)
             assert unit.get("rocker.phi") == pytest.approx(f([2.0], p=p), abs=1e-12)
+
+
+def test_parameters_lead_along_a_line_to_the_branch_of_the_model(tmp_path):
+    """Newton from the first position ends on another of the many: it is near a singular one."""
+    m = kc.Mechanism("comb")
+    c, wheel = m.parameter("c", 0.99), m.body("wheel", (0, 0, math.asin(0.99) / 20))
+    slide = m.body("slide")
+    m.add(kc.Revolute("O", m.ground, (0, 0), wheel, (0, 0)))
+    m.add(kc.Translational("guide", m.ground, (0, 0), (1, 0), slide, (0, 0), (1, 0)))
+    m.add(kc.Equation("teeth", sympy.sin(20 * wheel.phi) - slide.x - c))
+    path = written(tmp_path, "comb", m, transmission=(["slide.x"], ["wheel.phi"]))
+    for value in (0.0, 0.5, -0.9, 0.999):
+        with instance_of(path) as unit:
+            unit.put(c=value)
+            unit.begin()
+            assert unit.get("wheel.phi") == [pytest.approx(math.asin(value) / 20, abs=1e-14)]
 
 
 def heavy():

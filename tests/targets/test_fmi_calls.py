@@ -97,6 +97,17 @@ def test_states_are_kept_written_and_restored(units):
         unit.fmu.freeFMUState(kept)
 
 
+def test_parameters_may_change_until_the_initialization_ends(units):
+    with instance_of(units["slider"]) as unit:
+        unit.fmu.enterInitializationMode()
+        assert unit.get("slider.x") == [pytest.approx(0.4, abs=1e-14)]
+        unit.put(r=0.05)
+        assert unit.get("slider.x") == [pytest.approx(0.35, abs=1e-14)]
+        unit.put(L=0.2)
+        unit.fmu.exitInitializationMode()
+        assert unit.get("slider.x") == [pytest.approx(0.25, abs=1e-14)]
+
+
 def test_a_reset_leads_to_the_first_start(units):
     with instance_of(units["slider"]) as unit:
         first = unit.begin().get("slider.x", "r")

@@ -6,7 +6,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.cli.compile import ENDINGS
-from kincompile.emitters.registry import TARGETS
+from kincompile.emitters.registry import PACKAGES, TARGETS
 
 
 def test_that_the_module_written_is_the_one_that_emit_gives(kincompile, pendulum, tmp_path):
@@ -104,7 +104,7 @@ def test_that_the_ending_of_another_target_is_refused(
 
 def test_that_every_target_has_an_ending_and_a_place_in_the_help(kincompile):
     text = " ".join(kincompile("compile", "--help").stdout.split())
-    for name in TARGETS:
+    for name in (*TARGETS, *PACKAGES):
         assert name in set(ENDINGS.values())
         assert name in text
 
