@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING
 from kincompile import further
 from kincompile.emitters.emission import emit_program
 from kincompile.emitters.registry import PACKAGES, TARGETS
+from kincompile.emitters.target import Start
 from kincompile.errors import (
     InputError,
     KincompileError,
@@ -36,6 +37,7 @@ from kincompile.ir.lower import lower
 from kincompile.model.mechanism import Mechanism, system_of
 from kincompile.model.system import remember_model
 from kincompile.names import listed
+from kincompile.quantities import turning
 from kincompile.structure.counting import counting_problem
 
 if TYPE_CHECKING:
@@ -63,6 +65,8 @@ def emit(
     sensitivities: Sequence[str] = (),
     dynamics: bool = False,
     transmission: tuple[Sequence[str], Sequence[str]] | None = None,
+    real: str = "float64",
+    points: str = "many",
 ) -> Emitted:
     """Compile a mechanism to source files.
 
@@ -91,6 +95,12 @@ def emit(
         file is then the mechanism as a function from the one to the other, and nothing else.
         ``<name>_transmission(state, u)`` gives x, its Jacobian J by u and a status; it goes on from
         the last position, which the caller keeps.
+    real : {"float64", "float32"}
+        The type of numbers; ``"float32"`` is for one point at a time.
+    points : {"many", "one"}
+        ``"one"``, of the target ``"c"``, is for a controller: ``<name>_step(state, t)`` goes on
+        from the last position, which the caller keeps, to a time. It uses no heap, and little
+        memory and stack; ``.needs`` says how much.
 
     Returns
     -------
@@ -106,14 +116,17 @@ def emit(
         If the model cannot be used as written; every problem is listed.
     InputError
         If it has no parameter of a name, or with `dynamics` no masses; with `transmission`, if it
-        has no input or output of a name, or the inputs do not determine the outputs.
+        has no input or output of a name, or the inputs do not determine the outputs. For one point
+        at a time, if no position was found at t = 0, or float32 does not reach 1e-5 of it.
     StructuralError
         With `dynamics`, if a body has no mass, or constraints contradict each other.
     UnsupportedError
         If there is no such target, or it cannot print the mechanism: only ``"numpy"`` has the
-        grouped form, and that has neither sensitivities nor equations of motion.
+        grouped form, and that has neither sensitivities nor equations of motion; only ``"c"`` has
+        one point at a time.
     """
     _check_target(target, form)
+    _check_numbers(target, real, points, dynamics=dynamics)
     system = system_of(model)
     language = PACKAGES[target].language if target in PACKAGES else target
     if transmission is not None:
@@ -122,7 +135,8 @@ def emit(
                 "a transmission is a file of its own, written out, without sensitivities and "
                 "equations of motion; leave out what is asked for beside it"
             )
-        emitted, found = transmission_files(system, language, *transmission)
+        start = Start(real) if points == "one" else None
+        emitted, found = transmission_files(system, language, *transmission, start=start)
         return emitted if language == target else _unit(emitted, found, system)
     with _without_collector(system):
         if form == "grouped" and (sensitivities or dynamics):
@@ -137,7 +151,8 @@ def emit(
             code = further.sensitive(code.program, sensitivities)
         if dynamics:
             code = further.moving(code, system)
-        emitted = emit_program(language, code)
+        start = _start_of(system, code.program, real) if points == "one" else None
+        emitted = emit_program(language, code, start)
         if language != target:
             return _unit(emitted, code, system)
         if target != "numpy" or not isinstance(code, InlineProgram):
@@ -181,10 +196,12 @@ def transmission_files(
     outputs: Sequence[str],
     *,
     is_drawn: bool = False,
+    start: Start | None = None,
 ) -> tuple[Emitted, TransmissionCode]:
     """Return the files of a mechanism as a function of its inputs, and the code in them.
 
-    Its outputs are followed by all coordinates where it is to be drawn.
+    Its outputs are followed by all coordinates where it is to be drawn. A start says which numbers
+    it has for one point at a time.
     """
     from kincompile.emitters.transmission_emission import emit_transmission, require_transmission
     from kincompile.ir.transmission import transmission_code
@@ -209,7 +226,12 @@ def transmission_files(
     found = transmission_code(code, names, wanted, q.tolist(), lengths)
     defaults = {x.name: float(x.default or 0.0) for x in code.program.parameters}
     first = [q[k] for k in found.free], [defaults[name] for name in names]
-    return emit_transmission(target, found, *first), found
+    if start is not None and start.real == "float32":
+        names_of = [code.program.coordinates[k].name for k in found.free]
+        further.require_float32(
+            dict(zip(names_of, first[0], strict=True)), found.angular, found.size
+        )
+    return emit_transmission(target, found, *first, start), found
 
 
 @contextmanager
@@ -234,6 +256,54 @@ def _check_target(target: str, form: str | None) -> None:
         raise UnsupportedError(f"there is no target {target!r}; targets are: {listed(known)}")
     if form not in (None, "inline", "grouped"):
         raise InputError(f"there is no form {form!r}; forms are: inline, grouped")
+
+
+def _check_numbers(target: str, real: str, points: str, *, dynamics: bool) -> None:
+    """Refuse numbers and points that a target does not have."""
+    if real not in ("float64", "float32"):
+        raise InputError(f"there are no numbers {real!r}; real is float64 or float32")
+    if points not in ("many", "one"):
+        raise InputError(f"points are many or one, not {points!r}")
+    if points == "many" and real == "float32":
+        raise UnsupportedError(
+            "float32 is for one point at a time, as on a controller: give points='one' too"
+        )
+    if points == "many":
+        return
+    if target not in TARGETS or not TARGETS[target].has_one:
+        known = [name for name, item in TARGETS.items() if item.has_one]
+        raise UnsupportedError(
+            f"the target {target!r} has no code for one point at a time; targets that do: "
+            f"{listed(known)}"
+        )
+    if dynamics:
+        raise UnsupportedError(
+            "code for one point at a time follows the drivers, and has no equations of motion; "
+            "leave out dynamics, or points='one'"
+        )
+
+
+def _start_of(system: ConstraintSystem, program: Program, real: str) -> Start:
+    """Return where code for one point at a time begins: an assembled position, and the size."""
+    if program.unsolvable:
+        raise UnsupportedError(f"there is no motion to follow: {program.unsolvable}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RedundantConstraintWarning)
+        module = compile(system)
+    found = further.start_of(module)
+    if found is None:
+        raise InputError(
+            f"no position of {system.name} was found at t = 0, where code for one point at a time "
+            "begins: give a better guess."
+        )
+    q, size, sensitivity = found
+    if real == "float32":
+        named = dict(zip(program.names_of("coordinates"), q, strict=True))
+        angular = turning(
+            [x.unit for x in program.coordinates], [x.columns for x in program.bodies]
+        )
+        further.require_float32(named, angular, size, sensitivity)
+    return Start(real, tuple(q), size)
 
 
 def _is_grouped(system: ConstraintSystem, form: str | None) -> bool:

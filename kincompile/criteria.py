@@ -371,6 +371,41 @@ IN_RANGE = 1e-6
 """Part of nu that the equations cannot give, below which a singular point is no lock-up."""
 
 
+# float32
+
+IN_FLOAT32 = 1e-5
+"""Part of a scale to which float32 must know the coordinates where a motion begins."""
+
+OF_ROUNDING = (
+    "AGREEMENT", "SINGULAR_SENSITIVITY", "SLIGHT", "SMALLEST_PART", "SMOOTH", "SOLVED",
+    "STEEPEST", "TOLERANCE",
+)  # fmt: skip
+"""Criteria that say how many of the digits there are must be left, or may be lost."""
+
+
+def for_float32(name: str) -> float:
+    """Return a criterion for numbers of 24 bits: one of digits is the same part of those there are.
+
+    So what is the power 0.6 of float64's rounding error is that power of float32's. Rates may lose
+    half of their digits: with a third, as float64's, a delta robot would be near a singular
+    position everywhere, at a sensitivity of 400. The Jacobian of a transmission is that before the
+    last correction, which is then near what rounding leaves: J has five digits so.
+    """
+    eps, eps64 = (float(np.finfo(kind).eps) for kind in (np.float32, np.float64))
+    match name:
+        case "ROUNDING":
+            return 16 * eps
+        case "LAST_CORRECTION":
+            return 2 * for_float32("ROUNDING")
+        case "FARTHEST":
+            return for_float32("SLIGHT") / for_float32("ROUNDING")
+        case "TOO_NEAR":
+            return for_float32("SINGULAR_SENSITIVITY")
+    value: float = globals()[name]
+    power = math.log(eps) / math.log(eps64)
+    return float(f"{value**power:.2g}") if name in OF_ROUNDING else value
+
+
 def size_of(
     evaluate: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]],
     pattern: NDArray[np.signedinteger[Any]] | None,

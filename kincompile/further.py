@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile import criteria
 from kincompile.emitters.emission import emit_program
-from kincompile.errors import KincompileError, UnsupportedError
+from kincompile.errors import InputError, KincompileError, UnsupportedError
 from kincompile.ir.inline import InlineProgram, inline
 from kincompile.ir.lower import lower
 
@@ -217,3 +218,39 @@ def position_of(module: ModuleType) -> NDArray[np.float64] | None:
     except KincompileError:  # no equation has a value there
         return None
     return position if np.isfinite(position).all() else None
+
+
+def start_of(module: ModuleType) -> tuple[list[float], float, float] | None:
+    """Return the position at the start, the size there and the sensitivity, or None."""
+    from kincompile.runtime.engine.code import code_of
+    from kincompile.runtime.problem import problem
+
+    q = position_of(module)
+    if q is None:
+        return None
+    equations = problem(code_of(module), np.array(module.DEFAULTS), q, 0.0)
+    right = equations.magnitude * equations.probe
+    moved = np.linalg.lstsq(module.Phi_q(q, 0.0), right, rcond=None)[0] / equations.reference
+    return q.tolist(), equations.size, float(np.abs(moved).max())
+
+
+def require_float32(
+    q: Mapping[str, float], angular: Sequence[bool], size: float, sensitivity: float = 1.0
+) -> None:
+    """Refuse a position that float32 does not know to a part of the scales of its coordinates."""
+    eps = float(np.finfo(np.float32).eps)
+    for (name, value), is_angle in zip(q.items(), angular, strict=False):
+        scale = 1.0 if is_angle else size
+        if eps * abs(value) > criteria.IN_FLOAT32 * scale:
+            place = "1 rad" if is_angle else f"the size of the mechanism, {size:.3g}"
+            raise InputError(
+                f"{name} is {value:.6g} at t = 0, which float32 knows to {eps * abs(value):.1g}; "
+                f"it must know it to {criteria.IN_FLOAT32:.0e} of {place}. Let coordinates begin "
+                "nearer to zero, or choose real='float64'."
+            )
+    if sensitivity > (most := criteria.for_float32("TOO_NEAR")):
+        raise InputError(
+            "the mechanism is near a singular position at t = 0: an error of its equations moves "
+            f"coordinates {sensitivity:.3g} times as far, in their scales, and float32 bears "
+            f"{most:.3g} times. Begin elsewhere, or choose real='float64'."
+        )

@@ -2690,6 +2690,45 @@ static int locks_up(strip *b, const scales *s, double t, double smallest, double
     return isfinite(total) && fabs(forward) - left > BEFORE_LOCK_UP / SMALLEST_PART * smallest;
 }
 
+// Take one point, the first lane, from a good one to a time, in sub-steps. These are halved where
+// they fail and longer where they do not, and no longer than a part of the way to where velocities
+// end as they grow. The good point is the last one that was reached.
+static void walk(strip *b, const scales *s, state *at, double t, outcome *o)
+{
+    put_at(b, at, 0, 1);
+    const double before = speed_of(b, s);
+    // Times that rounding does not tell apart have no step between them.
+    const double smallest = fmax(fabs(t - at->t) * SMALLEST_PART, ROUNDING * fabs(t));
+    double h = 0.5 * (t - at->t);
+    int iterations = 0;
+    int is_stuck = 0;
+    for (int n = 0; n < MAX_SUBSTEPS; n++) {
+        const int is_whole = fabs(h) >= fabs(t - at->t);
+        const double following = is_whole ? t : at->t + h;
+        step(b, s, &following, o, 1);
+        const int is_good = o->status[0] == SPATIAL_SLIDER_CRANK_CONVERGED;
+        iterations += o->iterations[0];
+        if (is_good) {
+            take_up(at, b, 0);
+        } else {
+            put_at(b, at, 0, 1);
+        }
+        is_stuck = !is_good && fabs(h) <= smallest;
+        if (is_stuck || (is_good && is_whole))
+            break;
+        double size = fabs(h);
+        const double least = fmax(size / SHORTER, is_good ? 2.0 * smallest : 0.0);
+        const double ahead = fmax(BEFORE * until_lock_up(b, s, h), least);
+        size = fmin(size * (is_good ? GROWTH : 0.5), ahead);
+        h = h > 0.0 ? size : -size;
+    }
+    if (o->status[0] == SPATIAL_SLIDER_CRANK_CONVERGED && at->t != t)
+        o->status[0] = SPATIAL_SLIDER_CRANK_NOT_CONVERGED;
+    if (is_stuck && locks_up(b, s, t, smallest, before))
+        o->status[0] = SPATIAL_SLIDER_CRANK_LOCK_UP;
+    o->iterations[0] = iterations;
+}
+
 // Take the scales of one lane.
 static void scales_of(scales *own, const scales *s, size_t k)
 {
@@ -2705,9 +2744,7 @@ static void scales_of(scales *own, const scales *s, size_t k)
     }
 }
 
-// Take one lane from a good point to a time, in sub-steps. These are halved where they fail and
-// longer where they do not, and no longer than a part of the way to where velocities end as they
-// grow.
+// Take one lane from a good point to a time, in sub-steps.
 static void advance(strip *b, const scales *s, state *at, double t, size_t k, outcome *o)
 {
     strip alone;
@@ -2716,41 +2753,10 @@ static void advance(strip *b, const scales *s, state *at, double t, size_t k, ou
     constants_of_strip(&alone, 1);
     scales_of(&own, s, k);
     found.is_over[0] = 0;
-    put_at(&alone, at, 0, 1);
-    const double before = speed_of(&alone, &own);
-    const double smallest = fabs(t - at->t) * SMALLEST_PART;
-    double h = 0.5 * (t - at->t);
-    int iterations = 0;
-    int is_stuck = 0;
-    for (int n = 0; n < MAX_SUBSTEPS; n++) {
-        const int is_whole = fabs(h) >= fabs(t - at->t);
-        const double following = is_whole ? t : at->t + h;
-        step(&alone, &own, &following, &found, 1);
-        const int is_good = found.status[0] == SPATIAL_SLIDER_CRANK_CONVERGED;
-        iterations += found.iterations[0];
-        if (is_good) {
-            take_up(at, &alone, 0);
-        } else {
-            put_at(&alone, at, 0, 1);
-        }
-        is_stuck = !is_good && fabs(h) <= smallest;
-        if (is_stuck || (is_good && is_whole))
-            break;
-        double size = fabs(h);
-        const double least = fmax(size / SHORTER, is_good ? 2.0 * smallest : 0.0);
-        const double ahead = fmax(BEFORE * until_lock_up(&alone, &own, h), least);
-        size = fmin(size * (is_good ? GROWTH : 0.5), ahead);
-        h = h > 0.0 ? size : -size;
-    }
-    int status = found.status[0];
-    if (status == SPATIAL_SLIDER_CRANK_CONVERGED && at->t != t)
-        status = SPATIAL_SLIDER_CRANK_NOT_CONVERGED;
-    if (is_stuck && locks_up(&alone, &own, t, smallest, before))
-        status = SPATIAL_SLIDER_CRANK_LOCK_UP;
+    walk(&alone, &own, at, t, &found);
     o->residual[k] = found.residual[0];
-    o->status[k] = status;
-    o->iterations[k] = iterations;
-    take_up(at, &alone, 0);
+    o->status[k] = found.status[0];
+    o->iterations[k] = found.iterations[0];
     put_at(b, at, k, k + 1);
 }
 

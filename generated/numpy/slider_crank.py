@@ -971,6 +971,44 @@ def _locks_up(b, s, t, smallest, before):
         - left > _BEFORE_LOCK_UP / _SMALLEST_PART * smallest
 
 
+def _walk(b, s, at, t, o):
+    """Take one point, the first lane, from a good one to a time, in sub-steps.
+
+    These are halved where they fail and longer where they do not, and no longer than a part of the
+    way to where velocities end as they grow. The good point is the last one that was reached.
+    """
+    _copy(b, at)
+    before = _speed_of(b, s)
+    # Times that rounding does not tell apart have no step between them.
+    smallest = max(abs(t - at.t) * _SMALLEST_PART, _ROUNDING * abs(t))
+    h = 0.5 * (t - at.t)
+    iterations = 0
+    is_stuck = False
+    for n in range(_MAX_SUBSTEPS):
+        is_whole = abs(h) >= abs(t - at.t)
+        following = t if is_whole else at.t + h
+        _step(b, s, following, o)
+        is_good = o.status == _CONVERGED
+        iterations += o.iterations
+        if is_good:
+            _copy(at, b)
+        else:
+            _copy(b, at)
+        is_stuck = not is_good and abs(h) <= smallest
+        if is_stuck or (is_good and is_whole):
+            break
+        size = abs(h)
+        least = max(size / _SHORTER, 2.0 * smallest if is_good else 0.0)
+        ahead = max(_BEFORE * _until_lock_up(b, s, h), least)
+        size = min(size * (_GROWTH if is_good else 0.5), ahead)
+        h = size if h > 0.0 else -size
+    if o.status == _CONVERGED and at.t != t:
+        o.status = _NOT_CONVERGED
+    if is_stuck and _locks_up(b, s, t, smallest, before):
+        o.status = _LOCK_UP
+    o.iterations = iterations
+
+
 def _scales_of(own, s, k):
     """Take the scales of one lane."""
     own.tolerance = s.tolerance
@@ -984,50 +1022,17 @@ def _scales_of(own, s, k):
 
 
 def _advance(b, s, at, t, k, o):
-    """Take one lane from a good point to a time, in sub-steps.
-
-    These are halved where they fail and longer where they do not, and no longer than a part of the
-    way to where velocities end as they grow.
-    """
+    """Take one lane from a good point to a time, in sub-steps."""
     alone = _Point()
     own = _Scales()
     found = _Outcome()
     _constants_at(alone)
     _scales_of(own, s, k)
     found.is_over = False
-    _copy(alone, at)
-    before = _speed_of(alone, own)
-    smallest = abs(t - at.t) * _SMALLEST_PART
-    h = 0.5 * (t - at.t)
-    iterations = 0
-    is_stuck = False
-    for n in range(_MAX_SUBSTEPS):
-        is_whole = abs(h) >= abs(t - at.t)
-        following = t if is_whole else at.t + h
-        _step(alone, own, following, found)
-        is_good = found.status == _CONVERGED
-        iterations += found.iterations
-        if is_good:
-            _copy(at, alone)
-        else:
-            _copy(alone, at)
-        is_stuck = not is_good and abs(h) <= smallest
-        if is_stuck or (is_good and is_whole):
-            break
-        size = abs(h)
-        least = max(size / _SHORTER, 2.0 * smallest if is_good else 0.0)
-        ahead = max(_BEFORE * _until_lock_up(alone, own, h), least)
-        size = min(size * (_GROWTH if is_good else 0.5), ahead)
-        h = size if h > 0.0 else -size
-    status = found.status
-    if status == _CONVERGED and at.t != t:
-        status = _NOT_CONVERGED
-    if is_stuck and _locks_up(alone, own, t, smallest, before):
-        status = _LOCK_UP
+    _walk(alone, own, at, t, found)
     o.residual = found.residual
-    o.status = status
-    o.iterations = iterations
-    _copy(at, alone)
+    o.status = found.status
+    o.iterations = found.iterations
     _copy(b, at)
 
 

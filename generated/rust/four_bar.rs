@@ -1636,6 +1636,47 @@ fn locks_up(b: &mut Point, s: &Scales, t: f64, smallest: f64, before: f64) -> bo
         - left > BEFORE_LOCK_UP / SMALLEST_PART * smallest;
 }
 
+/// Take one point, the first lane, from a good one to a time, in sub-steps. These are halved where
+/// they fail and longer where they do not, and no longer than a part of the way to where velocities
+/// end as they grow. The good point is the last one that was reached.
+fn walk(b: &mut Point, s: &Scales, at: &mut State, t: f64, o: &mut Outcome) {
+    put_at(b, at);
+    let before = speed_of(b, s);
+    // Times that rounding does not tell apart have no step between them.
+    let smallest = ((t - at.t).abs() * SMALLEST_PART).max(ROUNDING * t.abs());
+    let mut h = 0.5 * (t - at.t);
+    let mut iterations = 0;
+    let mut is_stuck = false;
+    for n in 0..MAX_SUBSTEPS {
+        let is_whole = h.abs() >= (t - at.t).abs();
+        let following = if is_whole { t } else { at.t + h };
+        step(b, s, following, o);
+        let is_good = o.status == CONVERGED;
+        iterations += o.iterations;
+        if is_good {
+            take_up(at, b);
+        } else {
+            put_at(b, at);
+        }
+        is_stuck = !is_good && h.abs() <= smallest;
+        if is_stuck || (is_good && is_whole) {
+            break;
+        }
+        let mut size = h.abs();
+        let least = (size / SHORTER).max(if is_good { 2.0 * smallest } else { 0.0 });
+        let ahead = (BEFORE * until_lock_up(b, s, h)).max(least);
+        size = (size * (if is_good { GROWTH } else { 0.5 })).min(ahead);
+        h = if h > 0.0 { size } else { -size };
+    }
+    if o.status == CONVERGED && at.t != t {
+        o.status = NOT_CONVERGED;
+    }
+    if is_stuck && locks_up(b, s, t, smallest, before) {
+        o.status = LOCK_UP;
+    }
+    o.iterations = iterations;
+}
+
 /// Take the scales of one lane.
 fn scales_of(own: &mut Scales, s: &Scales, k: usize) {
     own.tolerance = s.tolerance;
@@ -1650,53 +1691,17 @@ fn scales_of(own: &mut Scales, s: &Scales, k: usize) {
     }
 }
 
-/// Take one lane from a good point to a time, in sub-steps. These are halved where they fail and
-/// longer where they do not, and no longer than a part of the way to where velocities end as they
-/// grow.
+/// Take one lane from a good point to a time, in sub-steps.
 fn advance(b: &mut Point, s: &Scales, at: &mut State, t: f64, k: usize, o: &mut Outcome) {
     let mut alone = Point::new();
     let mut own = Scales::new();
     let mut found = Outcome::new();
     scales_of(&mut own, s, k);
     found.is_over = false;
-    put_at(&mut alone, at);
-    let before = speed_of(&alone, &own);
-    let smallest = (t - at.t).abs() * SMALLEST_PART;
-    let mut h = 0.5 * (t - at.t);
-    let mut iterations = 0;
-    let mut is_stuck = false;
-    for n in 0..MAX_SUBSTEPS {
-        let is_whole = h.abs() >= (t - at.t).abs();
-        let following = if is_whole { t } else { at.t + h };
-        step(&mut alone, &own, following, &mut found);
-        let is_good = found.status == CONVERGED;
-        iterations += found.iterations;
-        if is_good {
-            take_up(at, &alone);
-        } else {
-            put_at(&mut alone, at);
-        }
-        is_stuck = !is_good && h.abs() <= smallest;
-        if is_stuck || (is_good && is_whole) {
-            break;
-        }
-        let mut size = h.abs();
-        let least = (size / SHORTER).max(if is_good { 2.0 * smallest } else { 0.0 });
-        let ahead = (BEFORE * until_lock_up(&alone, &own, h)).max(least);
-        size = (size * (if is_good { GROWTH } else { 0.5 })).min(ahead);
-        h = if h > 0.0 { size } else { -size };
-    }
-    let mut status = found.status;
-    if status == CONVERGED && at.t != t {
-        status = NOT_CONVERGED;
-    }
-    if is_stuck && locks_up(&mut alone, &own, t, smallest, before) {
-        status = LOCK_UP;
-    }
+    walk(&mut alone, &own, at, t, &mut found);
     o.residual = found.residual;
-    o.status = status;
-    o.iterations = iterations;
-    take_up(at, &alone);
+    o.status = found.status;
+    o.iterations = found.iterations;
     put_at(b, at);
 }
 

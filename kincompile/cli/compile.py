@@ -40,8 +40,20 @@ ENDINGS |= {item.ending: name for name, item in PACKAGES.items()}
 )
 @click.option("--dynamics", is_flag=True, help="The accelerations that follow from forces too.")
 @transmission_option("The mechanism as a function")
+@click.option(
+    "--real", default="float64", metavar="NAME", help="Numbers: float64, or float32 with one point."
+)
+@click.option(
+    "--points", default="many", metavar="HOW", help="many, or one at a time for a controller, in C."
+)
 def command(
-    model: str, output: str, target: str, dynamics: bool, transmission: Ends | None
+    model: str,
+    output: str,
+    target: str,
+    dynamics: bool,
+    transmission: Ends | None,
+    real: str,
+    points: str,
 ) -> None:
     """Write Phi, Phi_q, nu and gamma of MODEL as a module.
 
@@ -51,8 +63,17 @@ def command(
     it has the right side for an integrator, accelerations(q, q_dot, t, p). With --transmission the
     file is a function from inputs, drivers or coordinates, to outputs, with its Jacobian. The
     target fmi is a unit for co-simulation, FMI 3.0: an archive of C files and a library of them.
+    For a controller --target c --points one goes from one time to the next, from a state that the
+    caller keeps; how large that is is printed.
     """
-    emitted = kc.emit(read_model(model), target, dynamics=dynamics, transmission=transmission)
+    emitted = kc.emit(
+        read_model(model),
+        target,
+        dynamics=dynamics,
+        transmission=transmission,
+        real=real,
+        points=points,
+    )
     if emitted.unsolvable and not dynamics:
         click.echo(f"Warning: {emitted.unsolvable}", err=True)
     if output == "-" and target in PACKAGES:
@@ -66,6 +87,8 @@ def command(
             require_output(path, model, "the model itself")
     for path in emitted.write(folder, main):
         click.echo(f"Wrote {path}", err=True)
+    if emitted.needs:
+        click.echo(emitted.needs, err=True)
 
 
 def _destination(output: str, emitted: Emitted, target: str) -> tuple[Path, str]:

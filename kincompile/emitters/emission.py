@@ -7,19 +7,23 @@ from typing import TYPE_CHECKING
 from kincompile.emitters.evaluators import input_names, schedule
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.printer import Printer
-from kincompile.emitters.registry import load_grouped_form, load_target
+from kincompile.emitters.registry import load_grouped_form, load_one, load_target
 from kincompile.emitters.target import Emitted
 from kincompile.ir.inline import InlineProgram
 
 if TYPE_CHECKING:
+    from kincompile.emitters.target import Start
     from kincompile.ir.grouping import GroupedProgram
 
 
-def emit_program(name: str, code: InlineProgram | GroupedProgram) -> Emitted:
-    """Return the files of a program."""
+def emit_program(
+    name: str, code: InlineProgram | GroupedProgram, start: Start | None = None
+) -> Emitted:
+    """Return the files of a program; for one point at a time where a start is given."""
     if not isinstance(code, InlineProgram):
         return load_grouped_form(name)(code)
-    target, program = load_target(name), code.program
+    one = None if start is None else load_one(name, start)
+    target, program = one or load_target(name), code.program
     own = (program.name, *program.tables, *(f"{program.name}_{item}" for item in program.tables))
     table = NameTable((*target.RESERVED, *own))
     names = input_names(program, table)
@@ -31,4 +35,5 @@ def emit_program(name: str, code: InlineProgram | GroupedProgram) -> Emitted:
         functions[function] = target.function(function, code, listing, printer)
         called.update(listing.functions)
     files = target.files(code, functions, called)
-    return Emitted(program.name, files, unsolvable=program.unsolvable)
+    needs = one.needs(code) if one else ""
+    return Emitted(program.name, files, unsolvable=program.unsolvable, needs=needs)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from kincompile.emitters.target import Emitted, Target
-    from kincompile.emitters.transmission import TransmissionTarget
+    from kincompile.emitters.target import Emitted, OneTarget, Start, Target
+    from kincompile.emitters.transmission import OneTransmission, TransmissionTarget
     from kincompile.ir.grouping import GroupedProgram
 
 
@@ -25,6 +25,7 @@ class Listed:
     is_loadable: bool = False  # whether this process can call its code
     has_grouped_form: bool = False  # whether it has a form for large mechanisms
     has_transmission: bool = False  # whether its folder has a module `transmission`
+    has_one: bool = False  # whether its folder has a module `one`, for one point at a time
 
 
 TARGETS = {
@@ -32,7 +33,10 @@ TARGETS = {
         "kincompile.emitters.numpy", (".py",),
         is_loadable=True, has_grouped_form=True, has_transmission=True,
     ),
-    "c": Listed("kincompile.emitters.c", (".c", ".h"), is_loadable=True, has_transmission=True),
+    "c": Listed(
+        "kincompile.emitters.c", (".c", ".h"),
+        is_loadable=True, has_transmission=True, has_one=True,
+    ),
     "octave": Listed("kincompile.emitters.octave", (".m",), has_transmission=True),
     "javascript": Listed("kincompile.emitters.javascript", (".js", ".mjs"), has_transmission=True),
     "rust": Listed("kincompile.emitters.rust", (".rs",), has_transmission=True),
@@ -58,10 +62,23 @@ def load_target(name: str) -> Target:
     return target
 
 
+def load_one(name: str, start: Start) -> OneTarget:
+    """Return a target for one point at a time, which begins at a position."""
+    target: OneTarget = import_module(f"{TARGETS[name].folder}.one").Target(start)
+    return target
+
+
 def load_transmission(name: str) -> TransmissionTarget:
     """Return what writes the transmission of a target."""
     language: TransmissionTarget = import_module(f"{TARGETS[name].folder}.transmission")
     return language
+
+
+def load_one_transmission(name: str, start: Start) -> OneTransmission:
+    """Return what writes the transmission of a target for one point at a time."""
+    language = import_module(f"{TARGETS[name].folder}.transmission")
+    found: OneTransmission = language.One(start)
+    return found
 
 
 def load_grouped_form(name: str) -> Callable[[GroupedProgram], Emitted]:

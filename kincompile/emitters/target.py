@@ -42,18 +42,22 @@ class Emitted(Shown):
     unsolvable
         Why the equations cannot determine the coordinates, so that there is no motion to solve
         for; "" where they can.
+    needs
+        What code for a controller needs there: bytes and operations; "" for all other code.
     """
 
     name: str
     files: Mapping[str, str]
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     unsolvable: str = ""
+    needs: str = ""
 
     def to_text(self) -> str:
         """Return which files there are."""
         sizes = [f"{name}, {text.count(chr(10))} lines" for name, text in self.files.items()]
         lines = [*sizes, *([f"{self.name}.npz"] if self.arrays else [])]
         lines += [f"no motion to solve for: {self.unsolvable}"] if self.unsolvable else []
+        lines += [self.needs] if self.needs else []
         return "\n".join([self.headline(), *indented([*lines, ".source is the main file's text"])])
 
     def headline(self) -> str:
@@ -119,6 +123,15 @@ def _packed(arrays: Mapping[str, NDArray[Any]]) -> bytes:
     return buffer.getvalue()
 
 
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where code for one point at a time begins: a position at t = 0, and the mechanism's size."""
+
+    real: str  # the type of its numbers
+    q: tuple[float, ...] = ()
+    size: float = 1.0
+
+
 class Target(Protocol):
     """A language to emit: what the module `target` of its folder has.
 
@@ -143,3 +156,10 @@ class Target(Protocol):
         self, code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
     ) -> Mapping[str, str]:
         """Return the files, the main one first, given the lines of the functions by name."""
+
+
+class OneTarget(Target, Protocol):
+    """The same for one point at a time: the class `Target` of the module `one` of its folder."""
+
+    def needs(self, code: InlineProgram) -> str:
+        """Return how large a state is, and how many operations a correction takes."""

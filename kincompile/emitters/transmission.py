@@ -134,3 +134,10 @@ class TransmissionTarget(Protocol):
 
     def files(self, of: Transmission) -> Mapping[str, str]:
         """Return the files, the main one first."""
+
+
+class OneTransmission(TransmissionTarget, Protocol):
+    """The same for one point at a time: the class `One` of that module."""
+
+    def needs(self, of: Transmission) -> str:
+        """Return how large a state is, and how many operations a correction takes."""

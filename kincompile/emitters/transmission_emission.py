@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING
 from kincompile.emitters.evaluators import schedule
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.printer import Printer
-from kincompile.emitters.registry import TARGETS, load_target, load_transmission
+from kincompile.emitters.registry import (
+    TARGETS,
+    load_one,
+    load_one_transmission,
+    load_target,
+    load_transmission,
+)
 from kincompile.emitters.target import Emitted
 from kincompile.emitters.transmission import NUMBERS, Transmission
 from kincompile.errors import UnsupportedError
@@ -17,6 +23,7 @@ from kincompile.solver.vocabulary import STATUSES
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from kincompile.emitters.target import Start
     from kincompile.ir.transmission import TransmissionCode
 
 OWN = ("N", "K", "U", "X", "BLOCKS", "ONE", "ANGULAR", "IS_ANGLE", "NOTHING", *NUMBERS, *STATUSES)
@@ -33,16 +40,25 @@ def require_transmission(target: str) -> None:
 
 
 def emit_transmission(
-    target: str, code: TransmissionCode, q: Sequence[float], u: Sequence[float]
+    target: str,
+    code: TransmissionCode,
+    q: Sequence[float],
+    u: Sequence[float],
+    start: Start | None = None,
 ) -> Emitted:
-    """Return the files of a transmission, which begins at a position and its inputs."""
-    language = load_transmission(target)
+    """Return the files of a transmission, which begins at a position and its inputs.
+
+    A start says which numbers it has for one point at a time.
+    """
+    one = None if start is None else load_one_transmission(target, start)
+    language, owner = one or load_transmission(target), load_target(target)
+    if start is not None:
+        owner = load_one(target, start)
     program = code.code.program
-    reserved = (*load_target(target).RESERVED, *language.RESERVED, *OWN, program.name)
+    reserved = (*owner.RESERVED, *language.RESERVED, *OWN, program.name)
     table = NameTable((*reserved, *program.tables))
     names = {"t": "t", **{name: table.take(name) for name in code.read}}
     listing = schedule(code.code, ("outputs",), names, table)
-    printer = Printer(load_target(target).DIALECT, code.code.nodes, listing.names, program.name)
-    return Emitted(
-        program.name, language.files(Transmission(code, listing, printer, tuple(q), tuple(u)))
-    )
+    printer = Printer(owner.DIALECT, code.code.nodes, listing.names, program.name)
+    own = Transmission(code, listing, printer, tuple(q), tuple(u))
+    return Emitted(program.name, language.files(own), needs=one.needs(own) if one else "")

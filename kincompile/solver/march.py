@@ -1,9 +1,10 @@
-"""The march of a mechanism over a time grid: the second half of the text that `step` begins."""
+"""The march of a mechanism over a time grid: the last part of the text that `step` begins."""
 
 from __future__ import annotations
 
 from kincompile.criteria import *
 from kincompile.solver.step import *
+from kincompile.solver.walk import *
 from kincompile.solver.words import *
 
 
@@ -26,43 +27,6 @@ class Variants(Struct):
     iterations: Vector[Int]
 
 
-def speed_of(b: Point, s: Scales) -> Real:
-    """Return the largest velocity of a point, in scales of the coordinates."""
-    most: Real = 0.0
-    for i in range(N):
-        speed = abs(b.q_dot[i][0]) * s.inverse[i][0]
-        most = speed if speed > most else most
-    return most
-
-
-def until_lock_up(b: Point, s: Scales, forward: Real) -> Real:
-    """Return the time left at the growth of the largest velocity, where it grows forward."""
-    speed = speed_of(b, s)
-    growth: Real = 0.0
-    for i in range(N):
-        if abs(b.q_dot[i][0]) * s.inverse[i][0] == speed:
-            sign = 1.0 if b.q_dot[i][0] > 0.0 else -1.0
-            growth = b.q_ddot[i][0] * s.inverse[i][0] * sign
-    return speed / (2.0 * abs(growth)) if forward * growth > 0.0 else INFINITE
-
-
-def locks_up(b: Point, s: Scales, t: Real, smallest: Real, before: Real) -> Bool:
-    """Say whether a point that cannot be left by the smallest step is at a lock-up before a time.
-
-    There the equations must have values. Its speed was that before.
-    """
-    forward = t - b.t[0]
-    left = until_lock_up(b, s, forward)
-    if not (left <= LEFT * smallest and speed_of(b, s) >= GROWN * before):
-        return False
-    b.t[0] = t
-    position(b, lanes=1)
-    total: Real = 0.0
-    for i in range(M):
-        total += b.Phi[i][0]
-    return finite(total) and abs(forward) - left > BEFORE_LOCK_UP / SMALLEST_PART * smallest
-
-
 def scales_of(own: Scales, s: Scales, k: Count):
     """Take the scales of one lane."""
     own.tolerance = s.tolerance
@@ -79,50 +43,17 @@ def scales_of(own: Scales, s: Scales, k: Count):
 
 
 def advance(b: Point, s: Scales, at: State, t: Real, k: Count, o: Outcome):
-    """Take one lane from a good point to a time, in sub-steps.
-
-    These are halved where they fail and longer where they do not, and no longer than a part of the
-    way to where velocities end as they grow.
-    """
+    """Take one lane from a good point to a time, in sub-steps."""
     alone = Point()
     own = Scales()
     found = Outcome()
     constants(alone, lanes=1)
     scales_of(own, s, k)
     found.is_over[0] = False
-    put_at(alone, at, 0, 1)
-    before = speed_of(alone, own)
-    smallest = abs(t - at.t) * SMALLEST_PART
-    h: Real = 0.5 * (t - at.t)
-    iterations: Int = 0
-    is_stuck: Bool = False
-    for n in range(MAX_SUBSTEPS):
-        is_whole = abs(h) >= abs(t - at.t)
-        following = t if is_whole else at.t + h
-        step(alone, own, following, found, lanes=1)
-        is_good = found.status[0] == CONVERGED
-        iterations += found.iterations[0]
-        if is_good:
-            take_up(at, alone, 0)
-        else:
-            put_at(alone, at, 0, 1)
-        is_stuck = not is_good and abs(h) <= smallest
-        if is_stuck or (is_good and is_whole):
-            break
-        size = abs(h)
-        least = max(size / SHORTER, 2.0 * smallest if is_good else 0.0)
-        ahead = max(BEFORE * until_lock_up(alone, own, h), least)
-        size = min(size * (GROWTH if is_good else 0.5), ahead)
-        h = size if h > 0.0 else -size
-    status: Int = found.status[0]
-    if status == CONVERGED and at.t != t:
-        status = NOT_CONVERGED
-    if is_stuck and locks_up(alone, own, t, smallest, before):
-        status = LOCK_UP
+    walk(alone, own, at, t, found)
     o.residual[k] = found.residual[0]
-    o.status[k] = status
-    o.iterations[k] = iterations
-    take_up(at, alone, 0)
+    o.status[k] = found.status[0]
+    o.iterations[k] = found.iterations[0]
     put_at(b, at, k, k + 1)
 
 

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from kincompile.solver.nodes import Expression, Statement
 
 
-MARCH, START, SETS = ("step", "march"), ("attempt", "start"), "sets"
+MARCH, START, SETS = ("step", "walk", "march"), ("attempt", "start"), "sets"
 """The modules of a text; each builds on the ones before."""
 
 
@@ -71,6 +71,15 @@ def start() -> Text:
 def solver_of_sets() -> Text:
     """Return the plain march with what many parameter sets need, read once."""
     return read(source_of(SETS), solver())
+
+
+@cache
+def one_point() -> Text:
+    """Return what of the march takes one point at a time, read once."""
+    text = Text({}, {})
+    for name in ("step", "walk", "one"):
+        text = read(source_of(name), text)
+    return text
 
 
 @cache

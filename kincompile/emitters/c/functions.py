@@ -97,14 +97,14 @@ def _strip_function(name: str) -> list[str]:
 def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     """Return the functions that factor Phi_q and that solve Phi_q x = right at a point."""
     printer = Printer(C, listing.plan.nodes, listing.names)
-    body = solution(replace(WRITE, element="{}[{}][lane]"), listing, printer, _block_call)
+    body = solution(replace(WRITE, element="{}[{}][lane]"), listing, printer, block_call)
     head = [
         "_always_inline void solve_at(double (*restrict F)[LANES],",
         "    double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)",
         "{",
     ]
     solve = braced(head, body if listing.factors else ["(void)F;", *body])
-    factor = _plain("factor", factorization(WRITE, code, listing, printer, _block_call))
+    factor = _plain("factor", factorization(WRITE, code, listing, printer, block_call))
     return [
         *solve_statements.solve_functions(code, listing, factor, solve),
         "",
@@ -150,7 +150,7 @@ def _missed(code: InlineProgram) -> list[str]:
     return lines
 
 
-def _block_call(step: BlockCall, printer: Printer) -> list[str]:
+def block_call(step: BlockCall, printer: Printer) -> list[str]:
     """Return the call that solves a block, with the names of the unknowns, or its determinant."""
     matrix = operands(step.matrix, printer)
     if not step.right:

@@ -66,10 +66,13 @@ class CSolver(SolverPrinter):
     calls: Mapping[str, str] = {  # a constant
         "abs": "fabs", "finite": "isfinite", "max": "fmax", "min": "fmin",
     }  # fmt: skip
+    has_lanes = True
+    """Whether a lane is an entry of an array, of as many as a function is given."""
 
-    def __init__(self, text: Text, name: str) -> None:
-        super().__init__(text)
+    def __init__(self, text: Text, name: str, sizes: Mapping[str, int] | None = None) -> None:
+        SolverPrinter.__init__(self, text)
         self.name = name
+        self.sizes = sizes  # as numbers, where arrays have them in place of names
         self.own: Function | None = None
         self.inside = False  # a loop over lanes
         self.here: set[Variable] = set()  # what such a loop declares within itself
@@ -83,7 +86,9 @@ class CSolver(SolverPrinter):
         return BASES.get(base) or GIVEN.get(base) or base.lower()
 
     def dims(self, kind: Type) -> str:
-        """Return the sizes of an array."""
+        """Return the sizes of an array, of which C has none without entries."""
+        if self.sizes is not None:
+            return "".join(f"[{max(self.sizes[x], 1)}]" for x in kind.dims if x != LANE)
         sizes = [f"{x} > 0 ? {x} : 1" if x in AT_LEAST_ONE else x for x in kind.dims]
         return "".join(f"[{'LANES' if x == LANE else x}]" for x in sizes)
 
@@ -98,7 +103,7 @@ class CSolver(SolverPrinter):
             f"    {row:<{widest}}  // {note}" if note else f"    {row}"
             for row, note in zip(rows, notes, strict=True)
         ]
-        return [*self.about(item.about), "typedef struct {", *lines, f"}} {item.name.lower()};"]
+        return [*self.about(item.about), "typedef struct {", *lines, f"}} {self.kind(item.name)};"]
 
     def parameter(self, item: Function, variable: Variable) -> str:
         """Return a parameter."""
@@ -120,7 +125,7 @@ class CSolver(SolverPrinter):
         """Return the first lines of a function."""
         self.own, self.variables = item, list(variables_in(item.body))
         given = [self.parameter(item, x) for x in item.parameters]
-        given += ["size_t lanes"] * item.is_lanewise
+        given += ["size_t lanes"] * (item.is_lanewise and self.has_lanes)
         listed = ", ".join(x.replace(" ", HELD) for x in given)
         kind = self.kind(item.result.base)
         name = f"{self.name}_{item.name}" if item.name in PUBLIC else item.name
@@ -220,9 +225,9 @@ class CSolver(SolverPrinter):
             case Call("row" | "rows"):
                 return []
             case Call("solve", (Name() as point, right)):
-                factors = f"{point.variable.name}{self.arrow(point)}F"
-                given = f"{factors}, {self.place(right)}, {into}, lanes"
-                return [f"solve_of_strip({given});"]
+                given = [f"{point.variable.name}{self.arrow(point)}F", self.place(right), into]
+                given += ["lanes"] * self.has_lanes
+                return [f"{self.kernel('solve')}({', '.join(given)});"]
             case Constant():
                 return [f"memset({into}, 0, sizeof {into});"]
             case Call("copied", (source,)):
@@ -345,16 +350,21 @@ class CSolver(SolverPrinter):
         if name in PUBLIC:
             name = f"{self.name}_{name}"
         if is_kernel:
-            name += "_on_line" if name in ON_LINES else "_of_strip"
+            name = self.kernel(name)
         parameters: tuple[Variable | None, ...] = (None,) * len(node.arguments)
         is_lanewise = node.name in WORDS and WORDS[node.name].is_lanewise
         if node.name in self.functions:
             function = self.functions[node.name]
             parameters, is_lanewise = function.parameters, function.is_lanewise
         given = [self.given(x, y) for x, y in zip(node.arguments, parameters, strict=True)]
-        if is_lanewise:
+        if is_lanewise and self.has_lanes:
             given.append("lanes" if node.lanes is None else self.expression(node.lanes))
         return f"{name}({', '.join(given)})", ATOM
+
+    @staticmethod
+    def kernel(name: str) -> str:
+        """Return what a kernel is called."""
+        return f"{name}_on_line" if name in ON_LINES else f"{name}_of_strip"
 
     def given(self, argument: Expression, parameter: Variable | None) -> str:
         """Return an argument: of a struct its address, of one number for a lane too."""

@@ -78,7 +78,7 @@ def files(
     data = {**_without(about, "NAME"), **_tables(code, listing), "body": "".join(body)}
     source = fill("c/module.c.jinja", data)
     guard = f"{program.name.upper()}_H"
-    own = {"guard": guard, "places": _places(program), "outputs": indented(_outputs(code))}
+    own = {"guard": guard, "places": places(program), "outputs": indented(_outputs(code))}
     head = fill("c/module.h.jinja", {**about, **own})
     return {f"{program.name}.c": source, f"{program.name}.h": head}
 
@@ -117,16 +117,16 @@ def _tables(code: InlineProgram, listing: SolveListing | None) -> dict[str, Any]
         if quantity.is_matrix:
             places = [f"{{{row}, {column}}}" for row, column in code.pattern(quantity.name)]
             kind = "const int" if quantity.name == "Phi_q" else "static const int"
-            patterns.append(_array(f"{kind} {_pattern_name(code, quantity)}[][2]", places))
+            patterns.append(array(f"{kind} {_pattern_name(code, quantity)}[][2]", places))
         entries += [
-            _array(f"static const constant {quantity.name}_constant[]", numbers, "{0, 0.0}"),
-            _array(f"static const int {quantity.name}_computed[]", computed),
+            array(f"static const constant {quantity.name}_constant[]", numbers, "{0, 0.0}"),
+            array(f"static const int {quantity.name}_computed[]", computed),
         ]
         if quantity.is_matrix:
             width = program.shape_of(quantity)[1]
             flat = [str(row * width + column) for row, column in code.pattern(quantity.name)]
             own = [flat[int(k)] for k in computed]
-            entries.append(_array(f"static const int {quantity.name}_place[]", own))
+            entries.append(array(f"static const int {quantity.name}_place[]", own))
     return {
         "patterns": "\n".join(patterns),
         "entries": "\n".join(entries),
@@ -146,7 +146,8 @@ def _pattern_name(code: InlineProgram, quantity: Quantity) -> str:
     )
 
 
-def _array(declaration: str, items: Sequence[str], placeholder: str = "0") -> str:
+def array(declaration: str, items: Sequence[str], placeholder: str = "0") -> str:
+    """Return an array, on one line where that is short."""
     lines = _array_lines(items, placeholder)
     short = f"{declaration} = {{ {lines.strip().rstrip(',')} }};"
     return (
@@ -214,7 +215,7 @@ def _outputs(code: InlineProgram) -> list[str]:
     return lines
 
 
-def _places(program: Program) -> str:
+def places(program: Program) -> str:
     """Return the lines by which a program finds coordinates, parameters and outputs by name."""
     named = {
         "Q": program.names_of("coordinates"),
@@ -240,8 +241,7 @@ def _strip(
     largest = 0
     if listing is not None:
         lines = [*lines, *solve_functions(code, listing)]
-        sizes = (len(block.rows) for block in listing.plan.blocks)
-        largest = max((size for size in sizes if size > listing.plan.straight), default=0)
+        largest = largest_block(listing)
     data = {
         "is_planned": listing is not None,
         "elementary": elementary(code.program, called, largest),
@@ -254,9 +254,22 @@ def _strip(
     return fill("c/strip.c.jinja", data)
 
 
-def elementary(program: Program, called: Collection[str], largest: int) -> str:
-    """Return what the code calls: functions of angles, splines, the solve of blocks of a size."""
+def largest_block(listing: SolveListing) -> int:
+    """Return the size of the largest block that a call solves, 0 where none does."""
+    sizes = (len(block.rows) for block in listing.plan.blocks)
+    return max((size for size in sizes if size > listing.plan.straight), default=0)
+
+
+def elementary(
+    program: Program, called: Collection[str], largest: int, *, is_fast: bool = True
+) -> str:
+    """Return what the code calls: functions of angles, splines, the solve of blocks of a size.
+
+    Fast functions of angles take several points at once.
+    """
+    called = called if is_fast else ()
     data = {
+        "is_fast": is_fast,
         "alone": [long for short, long in (("cos", "cosine"), ("sin", "sine")) if short in called],
         "tables": "\n\n".join(_splines(program)),
         "has_angles": "atan2" in called,

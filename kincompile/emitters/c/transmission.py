@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from kincompile.emitters.c.functions import WRITE
 from kincompile.emitters.c.march import CSolver
+from kincompile.emitters.c.one import BYTES, bytes_of, in_real, needs_of, numbers, operations
 from kincompile.emitters.c.target import elementary
 from kincompile.emitters.constants import items
 from kincompile.emitters.lines import indented, wrapped
@@ -14,10 +16,11 @@ from kincompile.report.templates import fill
 from kincompile.solver.reader import transmission
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from kincompile.emitters.target import Start
     from kincompile.emitters.transmission import Transmission
-    from kincompile.solver.nodes import Text, Type
+    from kincompile.solver.nodes import Text
 
 RESERVED = ("s", "b", "pose")
 """Names that the functions use besides those of the target."""
@@ -32,11 +35,8 @@ class _Solver(CSolver):
     """Prints the text with numbers as the sizes of arrays; the state is in the header."""
 
     def __init__(self, text: Text, name: str, sizes: Mapping[str, int]) -> None:
-        super().__init__(text, name)
-        self.sizes = sizes
+        super().__init__(text, name, sizes)
         self.state = self.struct(text.structs["Transmission"])
-        self.state[-1] = f"}} {name}_state;"
-        self.structs = {**text.structs}
 
     def linkage(self, name: str) -> str:
         """Return what stands before a function.
@@ -50,10 +50,6 @@ class _Solver(CSolver):
         """Return the type of a base."""
         return f"{self.name}_state" if base == "Transmission" else super().kind(base)
 
-    def dims(self, kind: Type) -> str:
-        """Return the sizes of an array, of which C has none without entries."""
-        return "".join(f"[{max(self.sizes[x], 1)}]" for x in kind.dims)
-
     def text(self) -> str:
         """Return the pose and the functions."""
         parts = [self.struct(self.structs["Pose"]), ["{evaluate}"]]
@@ -61,12 +57,47 @@ class _Solver(CSolver):
         return "\n".join(line for lines in parts for line in [*lines, ""])
 
 
+@dataclass(frozen=True, slots=True)
+class One:
+    """A transmission in C for one point at a time, with numbers of a type."""
+
+    start: Start
+
+    RESERVED = RESERVED
+
+    def files(self, of: Transmission) -> Mapping[str, str]:
+        """Return the source and the header."""
+        return {x: in_real(self.start.real, text) for x, text in _files(of, self.start).items()}
+
+    def needs(self, of: Transmission) -> str:
+        """Return how large a state is, and how many operations a correction takes."""
+        state = transmission().structs["Transmission"]
+        nodes = [
+            item.node for section in of.of.code.sections for item in section.entries["outputs"]
+        ]
+        size = bytes_of(state, of.sizes, BYTES[self.start.real])
+        return needs_of(of.name, size, operations(of.of.code.nodes, nodes))
+
+
+def _numbers(start: Start | None) -> Iterable[str]:
+    """Return the definitions of criteria."""
+    if start is None:
+        return (f"#define {x} {value!r}" for x, value in NUMBERS.items())
+    return numbers(start.real, NUMBERS)
+
+
 def files(of: Transmission) -> Mapping[str, str]:
     """Return the source and the header."""
+    return _files(of, None)
+
+
+def _files(of: Transmission, start: Start | None) -> Mapping[str, str]:
+    """Return the source and the header; for one point at a time where a start is given."""
+    is_one = start is not None
     solver = _Solver(transmission(), of.name, of.sizes)
     name = f"{of.name}_transmission"
     called = of.listing.functions
-    body = of.evaluation(STATEMENTS, "{}->{}")
+    body = of.evaluation(replace(STATEMENTS, pair=()) if is_one else STATEMENTS, "{}->{}")
     about = "\n".join(f"// {line}".rstrip() for line in of.about())
     evaluated = fill(
         "c/evaluate.c.jinja",
@@ -75,6 +106,7 @@ def files(of: Transmission) -> Mapping[str, str]:
             "body": indented(body),
             "given": [f"{vector}[{k}]" for vector, k in of.of.read.values() if vector != "p"],
             "found": list(_written(body)),
+            "is_one": is_one,
         },
     )
     data = {
@@ -83,12 +115,13 @@ def files(of: Transmission) -> Mapping[str, str]:
         "NAME": of.name.upper(),
         "file": name,
         "sizes": indented(f"{x} = {n}," for x, n in of.sizes.items()),
-        "numbers": indented((f"#define {x} {value!r}" for x, value in NUMBERS.items()), 0),
+        "numbers": indented(_numbers(start), 0),
         "tables": "\n".join(
             f"static const int {x}[] = {{ {', '.join(items(own, ('0', '1'))) or '0'} }};"
             for x, own in of.tables.items()
         ),
-        "elementary": elementary(of.of.code.program, called, 0),
+        "elementary": elementary(of.of.code.program, called, 0, is_fast=not is_one),
+        "is_one": is_one,
         "solver": solver.text().replace("{evaluate}", evaluated.strip("\n")),
         "size": repr(of.of.size),
         **{x: _array(getattr(of, x)) for x in ("p", "u", "q")},
@@ -101,6 +134,7 @@ def files(of: Transmission) -> Mapping[str, str]:
         "statuses": indented(f"{of.name.upper()}_{x} = {n}," for x, n in statuses().items()),
         "inputs": len(of.of.inputs),
         "outputs": len(of.of.outputs),
+        "is_one": is_one,
     }
     return {
         f"{name}.c": fill("c/transmission.c.jinja", data),

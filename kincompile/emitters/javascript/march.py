@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     )
 
 FUNCTIONS_BY_HAND = (
-    "measure", "speed_of", "until_lock_up", "locks_up", "scales_of", "advance", "record",
+    "measure", "speed_of", "until_lock_up", "locks_up", "walk", "scales_of", "advance", "record",
     "put_at_guesses", "assemble", "march", "set_out", "go_on", "put_to_rest", "follow_variants",
     "march_variants", "position_from",
 )  # fmt: skip

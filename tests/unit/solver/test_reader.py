@@ -17,7 +17,7 @@ REFUSED = {
     ),
     "a field that is none": ("o.residual = 0.0", "o.residuals = 0.0", "Outcome has no residuals"),
     "a statement that is none": (
-        "            take_up(at, alone, 0)\n        else", "            del at\n        else",
+        "            take_up(at, b, 0)\n        else", "            del at\n        else",
         "Delete is no stat"
     ),
     "an expression that is none": ("PATTERN[e][0]\n", "[x for x in PATTERN][0]\n", "no expression"),
@@ -27,7 +27,7 @@ REFUSED = {
         "complete(b, s, o)\n    err", "complete(b, s, o, lanes=1)\n    err",
         "complete is called without lanes"
     ),
-    "lanes not said elsewhere": ("found, lanes=1)", "found)", "step takes as t"),
+    "lanes not said elsewhere": ("following, o, lanes=1)", "following, o)", "step takes as t"),
     "a kernel for no lanes": (
         "position(b, lanes=1)", "position(b)", "position is called with lanes"
     ),
@@ -57,7 +57,7 @@ REFUSED = {
     "a count and a whole number": ("good < count and", "status < count and", "count and int do"),
     "and of lanes": ("(o.status == CONVERGED) & has", "(o.status == CONVERGED) and has", "a lane"),
     "a parameter that is set": ("    forward = t -", "    t = t\n    forward = t -", "t stays"),
-    "a second type": ("    status: Int = found", "    h: Int = found", "h has a type already"),
+    "a second type": ("    is_stuck: Bool", "    h: Bool", "h has a type already"),
     "a type that is none": ("size: Real, s: Scales", "size: Float, s: Scales", "Float is no type"),
     "a parameter without a type": ("s: Scales, k: Count)", "s: Scales, k)", "k has no type"),
     "a default": ("s: Scales, k: Count)", "s: Scales, k: Count = 0)", "not plain"),
