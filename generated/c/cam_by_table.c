@@ -38,6 +38,17 @@ enum {
     BLOCKS = 2,  // blocks of the planned solve
 };
 
+// With _WHOLE_REGISTERS as many points are taken at a time as a register holds: what lies beyond the
+// last one is computed with them and never read. Then a compiler that vectorizes writes a loop once,
+// and not again for what would be left over: -O3 takes half the time.
+#if defined(_WHOLE_REGISTERS) && defined(__AVX__)
+#define _abreast(count) (((count) + 3) & ~(size_t)3)
+#elif defined(_WHOLE_REGISTERS) && (defined(__SSE2__) || defined(__aarch64__))
+#define _abreast(count) (((count) + 1) & ~(size_t)1)
+#else
+#define _abreast(count) (count)
+#endif
+
 const char cam_by_table_fingerprint[] = "c9788f74f0fa0194bfd96b8c06cfd64f";
 const double cam_by_table_defaults[] = {
     6.283185307179586,
@@ -270,8 +281,9 @@ _always_inline int64_t position_at(strip *at, size_t lane, int exact)
 static void position_of_strip(strip *at, size_t count)
 {
     int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= position_at(at, lane, 0);
+    const size_t all = _abreast(count);
+    for (size_t lane = 0; lane < all; lane++)
+        far |= position_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
         position_at(at, lane, 1);
 }
@@ -295,7 +307,8 @@ _always_inline void nu_at(strip *at, size_t lane)
 
 static void nu_of_strip(strip *at, size_t count)
 {
-    for (size_t lane = 0; lane < count; lane++)
+    const size_t all = _abreast(count);
+    for (size_t lane = 0; lane < all; lane++)
         nu_at(at, lane);
 }
 
@@ -346,8 +359,9 @@ _always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
 static void gamma_of_strip(strip *at, size_t count)
 {
     int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= gamma_at(at, lane, 0);
+    const size_t all = _abreast(count);
+    for (size_t lane = 0; lane < all; lane++)
+        far |= gamma_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
         gamma_at(at, lane, 1);
 }
@@ -441,8 +455,9 @@ _always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
 static void kinematics_of_strip(strip *at, size_t count)
 {
     int64_t far = 0;
-    for (size_t lane = 0; lane < count; lane++)
-        far |= kinematics_at(at, lane, 0);
+    const size_t all = _abreast(count);
+    for (size_t lane = 0; lane < all; lane++)
+        far |= kinematics_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
         kinematics_at(at, lane, 1);
 }
@@ -476,7 +491,8 @@ _always_inline void factor_at(strip *at, size_t lane)
 
 static void factor_of_strip(strip *at, size_t count)
 {
-    for (size_t lane = 0; lane < count; lane++)
+    const size_t all = _abreast(count);
+    for (size_t lane = 0; lane < all; lane++)
         factor_at(at, lane);
 }
 
@@ -564,13 +580,14 @@ _always_inline void missed_at(const strip *at, const double (*weight)[LANES],
 static void solve_of_strip(double (*restrict F)[LANES], double (*restrict right)[LANES],
     double (*restrict to)[LANES], size_t count)
 {
-    for (size_t lane = 0; lane < count; lane++)
+    const size_t all = _abreast(count);
+    for (size_t lane = 0; lane < all; lane++)
         solve_at(F, right, to, lane);
 }
 
 // Copy numbers of `count` points, from point `start` on, into rows; what is not finite shows in
 // `check`, which stays 0 otherwise.
-static void read_rows(double (*rows)[LANES], size_t size, cam_by_table_input from, size_t start,
+static inline void read_rows(double (*rows)[LANES], size_t size, cam_by_table_input from, size_t start,
     size_t count, double *check)
 {
     for (size_t i = 0; i < size; i++) {
@@ -580,6 +597,8 @@ static void read_rows(double (*rows)[LANES], size_t size, cam_by_table_input fro
         else
             for (size_t k = 0; k < count; k++)
                 rows[i][k] = first[(ptrdiff_t)k * from.point];
+        for (size_t k = count; k < _abreast(count); k++)
+            rows[i][k] = rows[i][0];
         for (size_t k = 0; k < count; k++)
             check[k] += rows[i][k] - rows[i][k];
     }
@@ -614,7 +633,7 @@ _always_inline void copy(double *to, const double *from, size_t size, int is_far
 }
 
 // Copy rows to where they are wanted: all of them, or those listed.
-static void store_rows(cam_by_table_output to, double (*rows)[LANES], const int *listed, int size,
+static inline void store_rows(cam_by_table_output to, double (*rows)[LANES], const int *listed, int size,
     size_t start, size_t count, int is_far)
 {
     if (to.first == NULL)
@@ -927,7 +946,10 @@ static void keep(strip *to, const strip *b)
 static void constants_of_strip(strip *b, size_t count)
 {
     double matrices[MATRICES];
-    place_constants(b, matrices, count);
+    place_constants(b, matrices, _abreast(count));
+    for (int i = 0; i < ROWS; i++)
+        for (size_t k = count; k < _abreast(count); k++)
+            ((double *)b)[(size_t)i * LANES + k] = 0;
     b->on.is_led = 0;
 }
 
@@ -946,10 +968,11 @@ static void lead(strip *b, cam_by_table_input ends, size_t first, size_t count)
 // Put points where those of others are on their lines, and a part of these beside it.
 static void put_beside(strip *to, const strip *b, double part, size_t count)
 {
+    const size_t all = _abreast(count);
     for (int i = 0; i < K; i++)
-        for (size_t k = 0; k < count; k++)
+        for (size_t k = 0; k < all; k++)
             to->p[i][k] = b->on.begin[i] + (b->t[k] + part) * (b->ends[i][k] - b->on.begin[i]);
-    for (size_t k = 0; k < count; k++)
+    for (size_t k = 0; k < all; k++)
         to->t[k] = b->on.t;
 }
 
@@ -969,6 +992,7 @@ _never_inline void position_on_line(strip *b, size_t count)
 
 _never_inline void nu_on_line(strip *b, size_t count)
 {
+    const size_t all = _abreast(count);
     if (!b->on.is_led) {
         nu_of_strip(b, count);
         return;
@@ -981,33 +1005,34 @@ _never_inline void nu_on_line(strip *b, size_t count)
     put_beside(&beside, b, FIRST_DIFFERENCE, count);
     position_of_strip(&beside, count);
     for (int i = 0; i < M; i++)
-        for (size_t k = 0; k < count; k++)
+        for (size_t k = 0; k < all; k++)
             b->nu[i][k] = (b->nu[i][k] - beside.Phi[i][k]) / (2 * FIRST_DIFFERENCE);
 }
 
 _never_inline void gamma_on_line(strip *b, size_t count)
 {
+    const size_t all = _abreast(count);
     if (!b->on.is_led) {
         gamma_of_strip(b, count);
         return;
     }
     strip beside;
     for (int i = 0; i < M; i++)
-        for (size_t k = 0; k < count; k++)
+        for (size_t k = 0; k < all; k++)
             b->gamma[i][k] = 2 * b->Phi[i][k];
     for (int side = -1; side < 2; side += 2) {
         const double part = side * SECOND_DIFFERENCE;
         for (int i = 0; i < N; i++)
-            for (size_t k = 0; k < count; k++)
+            for (size_t k = 0; k < all; k++)
                 beside.q[i][k] = b->q[i][k] + part * b->q_dot[i][k];
         put_beside(&beside, b, part, count);
         position_of_strip(&beside, count);
         for (int i = 0; i < M; i++)
-            for (size_t k = 0; k < count; k++)
+            for (size_t k = 0; k < all; k++)
                 b->gamma[i][k] -= beside.Phi[i][k];
     }
     for (int i = 0; i < M; i++)
-        for (size_t k = 0; k < count; k++)
+        for (size_t k = 0; k < all; k++)
             b->gamma[i][k] /= SECOND_DIFFERENCE * SECOND_DIFFERENCE;
 }
 
@@ -1015,13 +1040,14 @@ _never_inline void gamma_on_line(strip *b, size_t count)
 static void missed_of_strip(const strip *b, const double (*weight)[LANES],
     double *restrict by_velocity, double *restrict by_acceleration, size_t count)
 {
+    const size_t all = _abreast(count);
     if (!b->on.is_led) {
-        for (size_t k = 0; k < count; k++)
+        for (size_t k = 0; k < all; k++)
             missed_at(b, weight, &by_velocity[k], &by_acceleration[k], k);
         return;
     }
     // On a line right sides vary that otherwise never do.
-    for (size_t k = 0; k < count; k++) {
+    for (size_t k = 0; k < all; k++) {
         double first[M], second[M];
         by_velocity[k] = by_acceleration[k] = 0;
         for (int i = 0; i < M; i++) {
@@ -1093,10 +1119,11 @@ typedef struct {
 // Measure the equations of a mechanism around positions, which stay as they are.
 static void measure(strip *b, double size, scales *s, size_t lanes)
 {
+    const size_t all = _abreast(lanes);
     double q[N][LANES];
     memcpy(q, b->q, sizeof q);
     for (int i = 0; i < N; i++)
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             s->reference[i][lane] = ANGULAR[i] ? 1.0 : size;
             s->inverse[i][lane] = 1.0 / s->reference[i][lane];
             b->q[i][lane] += s->reference[i][lane] * PROBE[i];
@@ -1107,7 +1134,7 @@ static void measure(strip *b, double size, scales *s, size_t lanes)
     for (int e = 0; e < NONZEROS; e++) {
         const int i = cam_by_table_pattern[e][0];
         const int j = cam_by_table_pattern[e][1];
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             const double slope = fabs(b->Phi_q[e][lane]);
             s->magnitude[i][lane] += slope * s->reference[j][lane];
             const double most = FARTHEST * s->reference[j][lane];
@@ -1117,7 +1144,7 @@ static void measure(strip *b, double size, scales *s, size_t lanes)
     }
     for (int i = 0; i < M; i++) {
         const double allowed = IS_REDUNDANT[i] ? AGREEMENT : SOLVED;
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             const double terms = allowed * s->magnitude[i][lane];
             s->weight[i][lane] = 1.0 / (terms * allowed * s->magnitude[i][lane]);
         }
@@ -1129,9 +1156,10 @@ static void measure(strip *b, double size, scales *s, size_t lanes)
 // are stays where it is.
 static void correct(strip *b, const scales *s, int most, outcome *o, size_t lanes)
 {
+    const size_t all = _abreast(lanes);
     double iterations[LANES] = { 0 };
     double going[LANES];
-    for (size_t lane = 0; lane < lanes; lane++)
+    for (size_t lane = 0; lane < all; lane++)
         going[lane] = o->is_over[lane] ? 0 : 1;
     for (int iteration = 0; iteration < most; iteration++) {
         if (!any_lane(going, lanes))
@@ -1142,18 +1170,18 @@ static void correct(strip *b, const scales *s, int most, outcome *o, size_t lane
         double change[N][LANES];
         solve_of_strip(b->F, b->Phi, change, lanes);
         for (int i = 0; i < N; i++)
-            for (size_t lane = 0; lane < lanes; lane++) {
+            for (size_t lane = 0; lane < all; lane++) {
                 b->q[i][lane] -= going[lane] != 0 ? change[i][lane] : 0.0;
                 const double allowed = s->tolerance * s->reference[i][lane]
                     + ROUNDING * fabs(b->q[i][lane]);
                 is_large[lane] = fabs(change[i][lane]) <= allowed ? is_large[lane] : 1;
             }
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             iterations[lane] += going[lane];
             going[lane] = is_large[lane] != 0 ? going[lane] : 0;
         }
     }
-    for (size_t lane = 0; lane < lanes; lane++) {
+    for (size_t lane = 0; lane < all; lane++) {
         o->iterations[lane] = (int)iterations[lane];
         o->status[lane] = going[lane] != 0 ? CAM_BY_TABLE_NOT_CONVERGED
             : CAM_BY_TABLE_CONVERGED;
@@ -1166,19 +1194,20 @@ static void correct(strip *b, const scales *s, int most, outcome *o, size_t lane
 // square of the velocities too, which gamma is made of.
 static void complete(strip *b, const scales *s, outcome *o, size_t lanes)
 {
+    const size_t all = _abreast(lanes);
     double right[M][LANES];
     double is_off[LANES] = { 0 };
     double speed[LANES] = { 0 };
     double gain[LANES] = { 0 };
     position_on_line(b, lanes);
     factor_of_strip(b, lanes);
-    for (size_t lane = 0; lane < lanes; lane++) {
+    for (size_t lane = 0; lane < all; lane++) {
         o->residual[lane] = 0.0;
         o->sensitivity[lane] = 0.0;
     }
     const double terms = fmax(RESIDUAL_FACTOR * s->tolerance, ROUNDING);
     for (int i = 0; i < M; i++)
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             const double allowed = terms * s->magnitude[i][lane] + s->noise[i][lane];
             const double size = fabs(b->Phi[i][lane]);
             o->residual[lane] = size > o->residual[lane] ? size : o->residual[lane];
@@ -1193,14 +1222,14 @@ static void complete(strip *b, const scales *s, outcome *o, size_t lanes)
     gamma_on_line(b, lanes);
     solve_of_strip(b->F, b->gamma, b->q_ddot, lanes);
     for (int i = 0; i < N; i++)
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             const double moved = fabs(answer[i][lane]) * s->inverse[i][lane];
             o->sensitivity[lane] = moved <= o->sensitivity[lane] ? o->sensitivity[lane] : moved;
             speed[lane] += fabs(b->q_dot[i][lane]) * s->inverse[i][lane];
             gain[lane] += fabs(b->q_ddot[i][lane]) * s->inverse[i][lane];
         }
     missed_of_strip(b, s->weight, o->by_velocity, o->by_acceleration, lanes);
-    for (size_t lane = 0; lane < lanes; lane++) {
+    for (size_t lane = 0; lane < all; lane++) {
         const double first = speed[lane] * speed[lane];
         const double second = (gain[lane] + first) * (gain[lane] + first);
         const int is_met = o->by_velocity[lane] <= first && o->by_acceleration[lane] <= second;
@@ -1219,15 +1248,16 @@ static void complete(strip *b, const scales *s, outcome *o, size_t lanes)
 // predicted too, compared with the position's error.
 static void step(strip *b, const scales *s, const double *t, outcome *o, size_t lanes)
 {
+    const size_t all = _abreast(lanes);
     double before[BLOCKS > 0 ? BLOCKS : 1][LANES];
     memcpy(before, b->determinants, sizeof before);
-    double h[LANES];
+    double h[LANES] = { 0 };
     for (size_t lane = 0; lane < lanes; lane++) {
         h[lane] = t[lane] - b->t[lane];
         b->t[lane] = t[lane];
     }
     for (int i = 0; i < N; i++)
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             b->q[i][lane] += h[lane] * (b->q_dot[i][lane] + 0.5 * h[lane] * b->q_ddot[i][lane]);
             b->q_dot[i][lane] += h[lane] * b->q_ddot[i][lane];
         }
@@ -1241,7 +1271,7 @@ static void step(strip *b, const scales *s, const double *t, outcome *o, size_t 
     double kink[LANES] = { 0 };
     double has_crossed[LANES] = { 0 };
     for (int i = 0; i < N; i++)
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             const double apart = fabs(b->q[i][lane] - q[i][lane]) * s->inverse[i][lane];
             const double turn = fabs(h[lane] * (b->q_dot[i][lane]
                         - q_dot[i][lane])) * s->inverse[i][lane];
@@ -1249,12 +1279,12 @@ static void step(strip *b, const scales *s, const double *t, outcome *o, size_t 
             kink[lane] = turn > kink[lane] ? turn : kink[lane];
         }
     for (int i = 0; i < BLOCKS; i++)
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             const int stays = before[i][lane] > 0.0 ? b->determinants[i][lane] > 0.0
                 : b->determinants[i][lane] < 0.0;
             has_crossed[lane] = stays ? has_crossed[lane] : 1;
         }
-    for (size_t lane = 0; lane < lanes; lane++) {
+    for (size_t lane = 0; lane < all; lane++) {
         const int is_bent = o->sensitivity[lane] > NEARLY_SINGULAR
             && kink[lane] > KINK * error[lane] + SMOOTH;
         const int is_past = is_bent
@@ -1363,7 +1393,7 @@ static void advance(strip *b, const scales *s, state *at, double t, size_t k, ou
 {
     strip alone;
     scales own;
-    outcome found;
+    outcome found = { 0 };
     constants_of_strip(&alone, 1);
     scales_of(&own, s, k);
     found.is_over[0] = 0;
@@ -1437,7 +1467,7 @@ static size_t march(const cam_by_table_variants *m)
 {
     strip b;
     scales s;
-    outcome o;
+    outcome o = { 0 };
     state at;
     assemble(m, &b, &s, 0, LANES, &o);
     record(m, &b, &o, 0, 0, 1);
@@ -1481,7 +1511,7 @@ static size_t march(const cam_by_table_variants *m)
 // is then the one at the first time.
 static int set_out(const cam_by_table_variants *m, strip *b, state *at, scales *s)
 {
-    outcome o;
+    outcome o = { 0 };
     assemble(m, b, s, 0, 1, &o);
     take_up(at, b, 0);
     return o.status[0];
@@ -1492,7 +1522,7 @@ static int set_out(const cam_by_table_variants *m, strip *b, state *at, scales *
 // point that does not get there stays where it is.
 static int go_on(strip *b, state *at, const scales *s, double t, const double *p)
 {
-    outcome o;
+    outcome o = { 0 };
     o.is_over[0] = 0;
     put_at(b, at, 0, 1);
     int has_own = 1;
@@ -1545,7 +1575,7 @@ size_t cam_by_table_follow_variants(const cam_by_table_variants *m, double farth
     strip b;
     strip before;
     scales s;
-    outcome o;
+    outcome o = { 0 };
     state at;
     size_t good = 0;
     for (size_t first = 0; first < m->variants; first += LANES) {
@@ -1596,27 +1626,28 @@ size_t cam_by_table_march_variants(const cam_by_table_variants *m)
 // Find by what equations are multiplied to count alike, and by how much they are missed.
 _never_inline void weigh(strip *b, const scales *s, descent *d, size_t lanes)
 {
+    const size_t all = _abreast(lanes);
     double total[LANES] = { 0 };
     memset(d->weight, 0, sizeof d->weight);
-    for (size_t lane = 0; lane < lanes; lane++)
+    for (size_t lane = 0; lane < all; lane++)
         d->steepest[lane] = 0.0;
     for (int e = 0; e < NONZEROS; e++) {
         const int i = cam_by_table_pattern[e][0];
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             const double slope = fabs(b->Phi_q[e][lane]);
             d->weight[i][lane] += slope * s->reference[cam_by_table_pattern[e][1]][lane];
             d->steepest[lane] = slope > d->steepest[lane] ? slope : d->steepest[lane];
         }
     }
     for (int i = 0; i < M; i++)
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             const double most = STEEP / ROUNDING * s->noise[i][lane];
             double terms = most > 0.0 && d->weight[i][lane] > most ? most : d->weight[i][lane];
             terms = s->magnitude[i][lane] > terms ? s->magnitude[i][lane] : terms;
             d->weight[i][lane] = terms > 0.0 ? 1.0 / terms : 1.0;
             total[lane] += d->weight[i][lane] * b->Phi[i][lane] * d->weight[i][lane] * b->Phi[i][lane];
         }
-    for (size_t lane = 0; lane < lanes; lane++)
+    for (size_t lane = 0; lane < all; lane++)
         d->residual[lane] = sqrt(total[lane]);
 }
 
@@ -1625,17 +1656,18 @@ _never_inline void weigh(strip *b, const scales *s, descent *d, size_t lanes)
 _never_inline void eliminate(strip *b, const double *scale, const double *bend, descent *d,
     size_t lanes)
 {
+    const size_t all = _abreast(lanes);
     int first = 0;
     memset(d->normal, 0, sizeof d->normal);
     for (int e = 0; e < NONZEROS; e++) {
         const int i = cam_by_table_pattern[e][0];
         const int j = cam_by_table_pattern[e][1];
-        for (size_t lane = 0; lane < lanes; lane++)
+        for (size_t lane = 0; lane < all; lane++)
             d->entry[e][lane] = d->weight[i][lane] * b->Phi_q[e][lane] * scale[j];
         if (cam_by_table_pattern[first][0] != i)
             first = e;
         for (int f = first; f < e + 1; f++)
-            for (size_t lane = 0; lane < lanes; lane++)
+            for (size_t lane = 0; lane < all; lane++)
                 d->normal[j * (j + 1) / 2
                         + cam_by_table_pattern[f][1]][lane] += d->entry[e][lane] * d->entry[f][lane];
     }
@@ -1644,14 +1676,14 @@ _never_inline void eliminate(strip *b, const double *scale, const double *bend, 
             d->normal[k * (k + 1) / 2 + k][lane] += bend[lane];
     for (int k = 0; k < N; k++) {
         double inverse[LANES];
-        for (size_t lane = 0; lane < lanes; lane++)
+        for (size_t lane = 0; lane < all; lane++)
             inverse[lane] = 1.0 / d->normal[k * (k + 1) / 2 + k][lane];
         for (int i = k + 1; i < N; i++) {
             double factor[LANES];
-            for (size_t lane = 0; lane < lanes; lane++)
+            for (size_t lane = 0; lane < all; lane++)
                 factor[lane] = d->normal[i * (i + 1) / 2 + k][lane] * inverse[lane];
             for (int j = k + 1; j < i + 1; j++)
-                for (size_t lane = 0; lane < lanes; lane++)
+                for (size_t lane = 0; lane < all; lane++)
                     d->normal[i * (i + 1) / 2
                             + j][lane] -= factor[lane] * d->normal[j * (j + 1) / 2 + k][lane];
         }
@@ -1661,24 +1693,25 @@ _never_inline void eliminate(strip *b, const double *scale, const double *bend, 
 // Solve the normal equations, which are factored, for a right side in place of the step.
 _never_inline void substitute(descent *d, size_t lanes)
 {
-    for (size_t lane = 0; lane < lanes; lane++)
+    const size_t all = _abreast(lanes);
+    for (size_t lane = 0; lane < all; lane++)
         d->falls[lane] = 0.0;
     for (int k = 0; k < N; k++) {
         double part[LANES];
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             part[lane] = d->step[k][lane] / d->normal[k * (k + 1) / 2 + k][lane];
             d->falls[lane] += d->step[k][lane] * part[lane];
         }
         for (int i = k + 1; i < N; i++)
-            for (size_t lane = 0; lane < lanes; lane++)
+            for (size_t lane = 0; lane < all; lane++)
                 d->step[i][lane] -= d->normal[i * (i + 1) / 2 + k][lane] * part[lane];
     }
     for (int n = 0; n < N; n++) {
         const int k = N - 1 - n;
         for (int i = k + 1; i < N; i++)
-            for (size_t lane = 0; lane < lanes; lane++)
+            for (size_t lane = 0; lane < all; lane++)
                 d->step[k][lane] -= d->normal[i * (i + 1) / 2 + k][lane] * d->step[i][lane];
-        for (size_t lane = 0; lane < lanes; lane++)
+        for (size_t lane = 0; lane < all; lane++)
             d->step[k][lane] = d->step[k][lane] / d->normal[k * (k + 1) / 2 + k][lane];
     }
 }
@@ -1686,18 +1719,19 @@ _never_inline void substitute(descent *d, size_t lanes)
 // Find Levenberg's and Marquardt's correction from the normal equations.
 _never_inline void direct(strip *b, const double *scale, descent *d, size_t lanes)
 {
+    const size_t all = _abreast(lanes);
     double bend[LANES];
-    for (size_t lane = 0; lane < lanes; lane++)
+    for (size_t lane = 0; lane < all; lane++)
         bend[lane] = BEND * (d->residual[lane] < 1.0 ? d->residual[lane] : 1.0);
     eliminate(b, scale, bend, d, lanes);
     memset(d->step, 0, sizeof d->step);
     for (int e = 0; e < NONZEROS; e++) {
         const int i = cam_by_table_pattern[e][0];
-        for (size_t lane = 0; lane < lanes; lane++)
+        for (size_t lane = 0; lane < all; lane++)
             d->step[cam_by_table_pattern[e][1]][lane] -= d->entry[e][lane] * d->weight[i][lane] * b->Phi[i][lane];
     }
     substitute(d, lanes);
-    for (size_t lane = 0; lane < lanes; lane++)
+    for (size_t lane = 0; lane < all; lane++)
         d->falls[lane] = d->falls[lane] / (d->residual[lane] * d->residual[lane]);
 }
 
@@ -1707,12 +1741,13 @@ _never_inline void direct(strip *b, const double *scale, descent *d, size_t lane
 _never_inline void descend(strip *b, const scales *s, const double *scale, int most, descent *d,
     size_t lanes)
 {
+    const size_t all = _abreast(lanes);
     double is_near[LANES] = { 0 };
     double going[LANES];
     double third[LANES];
     double second[LANES];
     double last[LANES];
-    for (size_t lane = 0; lane < lanes; lane++) {
+    for (size_t lane = 0; lane < all; lane++) {
         going[lane] = 1;
         third[lane] = INFINITY;
         second[lane] = INFINITY;
@@ -1721,7 +1756,7 @@ _never_inline void descend(strip *b, const scales *s, const double *scale, int m
     position_on_line(b, lanes);
     for (int iteration = 0; iteration < most; iteration++) {
         weigh(b, s, d, lanes);
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             const int is_close = !(d->residual[lane] > ASSEMBLES)
                 || !(d->steepest[lane] < TOO_STEEP);
             is_near[lane] = (going[lane] != 0 && is_close) ? 1 : is_near[lane];
@@ -1734,7 +1769,7 @@ _never_inline void descend(strip *b, const scales *s, const double *scale, int m
         if (!any_lane(going, lanes))
             break;
         direct(b, scale, d, lanes);
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             const int is_wild = !isfinite(d->falls[lane]);
             is_near[lane] = (going[lane] != 0 && is_wild) ? 1 : is_near[lane];
             going[lane] = going[lane] != 0 && !is_wild && d->falls[lane] > STATIONARY;
@@ -1742,22 +1777,22 @@ _never_inline void descend(strip *b, const scales *s, const double *scale, int m
         double begin[N][LANES];
         memcpy(begin, b->q, sizeof begin);
         double excess[LANES];
-        for (size_t lane = 0; lane < lanes; lane++)
+        for (size_t lane = 0; lane < all; lane++)
             excess[lane] = 1.0;
         for (int i = 0; i < N; i++)
-            for (size_t lane = 0; lane < lanes; lane++) {
+            for (size_t lane = 0; lane < all; lane++) {
                 const double size = fabs(d->step[i][lane]) / (ANGULAR[i] ? LARGEST_ANGLE : 1.0);
                 excess[lane] = size > excess[lane] ? size : excess[lane];
             }
         double part[LANES];
         double trying[LANES];
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             part[lane] = 1.0 / excess[lane];
             trying[lane] = going[lane] != 0;
         }
         while (any_lane(trying, lanes)) {
             for (int i = 0; i < N; i++)
-                for (size_t lane = 0; lane < lanes; lane++) {
+                for (size_t lane = 0; lane < all; lane++) {
                     const double moved = begin[i][lane]
                         + part[lane] * scale[i] * d->step[i][lane];
                     b->q[i][lane] = trying[lane] != 0 ? moved : b->q[i][lane];
@@ -1765,10 +1800,10 @@ _never_inline void descend(strip *b, const scales *s, const double *scale, int m
             position_on_line(b, lanes);
             double total[LANES] = { 0 };
             for (int i = 0; i < M; i++)
-                for (size_t lane = 0; lane < lanes; lane++)
+                for (size_t lane = 0; lane < all; lane++)
                     total[lane] += d->weight[i][lane] * b->Phi[i][lane] * d->weight[i][lane] * b->Phi[i][lane];
             double is_over[LANES];
-            for (size_t lane = 0; lane < lanes; lane++) {
+            for (size_t lane = 0; lane < all; lane++) {
                 const int is_lower = sqrt(total[lane]) <= (1.0
                         - SUFFICIENT * part[lane]) * d->residual[lane];
                 trying[lane] = is_lower ? 0 : trying[lane];
@@ -1778,11 +1813,11 @@ _never_inline void descend(strip *b, const scales *s, const double *scale, int m
                 trying[lane] = is_over[lane] != 0 ? 0 : trying[lane];
             }
             for (int i = 0; i < N; i++)
-                for (size_t lane = 0; lane < lanes; lane++)
+                for (size_t lane = 0; lane < all; lane++)
                     b->q[i][lane] = is_over[lane] != 0 ? begin[i][lane] : b->q[i][lane];
         }
     }
-    for (size_t lane = 0; lane < lanes; lane++)
+    for (size_t lane = 0; lane < all; lane++)
         d->is_near[lane] = is_near[lane] != 0;
 }
 
@@ -1793,7 +1828,7 @@ void cam_by_table_attempt_variants(const cam_by_table_variants *m)
 {
     strip b;
     scales s;
-    outcome o;
+    outcome o = { 0 };
     descent d;
     double scale[N];
     for (int i = 0; i < N; i++)
@@ -1815,53 +1850,54 @@ void cam_by_table_attempt_variants(const cam_by_table_variants *m)
 _never_inline void mirror(strip *b, const double *magnitude, const double *scale, descent *d,
     size_t lanes)
 {
+    const size_t all = _abreast(lanes);
     double image[M][LANES];
     double none[LANES] = { 0 };
     double least[LANES] = { 0 };
     double bend[LANES] = { 0 };
     position_on_line(b, lanes);
     for (int i = 0; i < M; i++)
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             d->weight[i][lane] = magnitude[i] > 0.0 ? 1.0 / magnitude[i] : 1.0;
             image[i][lane] = 0.0;
         }
     eliminate(b, scale, none, d, lanes);
     for (int i = 0; i < N; i++)
-        for (size_t lane = 0; lane < lanes; lane++)
+        for (size_t lane = 0; lane < all; lane++)
             d->step[i][lane] = PROBE[i];
     for (int iteration = 0; iteration < INVERSE_ITERATIONS; iteration++) {
         substitute(d, lanes);
         double square[LANES] = { 0 };
         for (int i = 0; i < N; i++)
-            for (size_t lane = 0; lane < lanes; lane++)
+            for (size_t lane = 0; lane < all; lane++)
                 square[lane] += d->step[i][lane] * d->step[i][lane];
         double size[LANES];
-        for (size_t lane = 0; lane < lanes; lane++)
+        for (size_t lane = 0; lane < all; lane++)
             size[lane] = sqrt(square[lane]);
         for (int i = 0; i < N; i++)
-            for (size_t lane = 0; lane < lanes; lane++)
+            for (size_t lane = 0; lane < all; lane++)
                 d->step[i][lane] = d->step[i][lane] / size[lane];
     }
     for (int e = 0; e < NONZEROS; e++)
-        for (size_t lane = 0; lane < lanes; lane++)
+        for (size_t lane = 0; lane < all; lane++)
             image[cam_by_table_pattern[e][0]][lane] += d->entry[e][lane] * d->step[cam_by_table_pattern[e][1]][lane];
     for (int i = 0; i < M; i++)
-        for (size_t lane = 0; lane < lanes; lane++)
+        for (size_t lane = 0; lane < all; lane++)
             least[lane] += image[i][lane] * image[i][lane];
     for (int i = 0; i < N; i++)
-        for (size_t lane = 0; lane < lanes; lane++)
+        for (size_t lane = 0; lane < all; lane++)
             b->q[i][lane] += MIRROR_STEP * scale[i] * d->step[i][lane];
     position_on_line(b, lanes);
     for (int e = 0; e < NONZEROS; e++) {
         const int i = cam_by_table_pattern[e][0];
         const int j = cam_by_table_pattern[e][1];
-        for (size_t lane = 0; lane < lanes; lane++) {
+        for (size_t lane = 0; lane < all; lane++) {
             const double moved = d->weight[i][lane] * b->Phi_q[e][lane] * scale[j];
             bend[lane] += image[i][lane] * (moved - d->entry[e][lane]) * d->step[j][lane];
         }
     }
     for (int i = 0; i < N; i++)
-        for (size_t lane = 0; lane < lanes; lane++)
+        for (size_t lane = 0; lane < all; lane++)
             b->q[i][lane] -= (MIRROR_STEP
                     + 2.0 * least[lane] * MIRROR_STEP / bend[lane]) * scale[i] * d->step[i][lane];
 }
@@ -1872,7 +1908,7 @@ void cam_by_table_mirror_variants(const cam_by_table_variants *m, const double *
 {
     strip b;
     scales s;
-    outcome o;
+    outcome o = { 0 };
     descent d;
     double scale[N];
     for (int i = 0; i < N; i++)
@@ -1893,7 +1929,7 @@ void cam_by_table_lead_variants(const cam_by_table_variants *m, cam_by_table_inp
     strip b;
     strip before;
     scales s;
-    outcome o;
+    outcome o = { 0 };
     state at;
     for (size_t first = 0; first < m->variants; first += LANES) {
         const size_t count = m->variants - first < LANES ? m->variants - first : LANES;

@@ -76,8 +76,9 @@ def _with_angles(name: str, body: list[str]) -> list[str]:
         f"static void {name}_of_strip(strip *at, size_t count)",
         "{",
         "    int64_t far = 0;",
-        "    for (size_t lane = 0; lane < count; lane++)",
-        f"        far |= {name}_at(at, lane, 0);",
+        "    const size_t all = _abreast(count);",
+        "    for (size_t lane = 0; lane < all; lane++)",
+        f"        far |= {name}_at(at, lane, 0) & -(int64_t)(lane < count);",
         "    for (size_t lane = 0; far && lane < count; lane++)",
         f"        {name}_at(at, lane, 1);",
         "}",
@@ -88,7 +89,8 @@ def _strip_function(name: str) -> list[str]:
     return [
         f"static void {name}_of_strip(strip *at, size_t count)",
         "{",
-        "    for (size_t lane = 0; lane < count; lane++)",
+        "    const size_t all = _abreast(count);",
+        "    for (size_t lane = 0; lane < all; lane++)",
         f"        {name}_at(at, lane);",
         "}",
     ]

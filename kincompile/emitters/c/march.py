@@ -52,6 +52,8 @@ ON_LINES = ("position", "nu", "gamma")
 NUMBERS = {"NOTHING": "NAN", "INFINITE": "INFINITY"}
 AT_LEAST_ONE = ("BLOCKS", "K")
 """Sizes that may be 0, of which C has no arrays."""
+CLEARED = ("Outcome",)
+"""Structs that begin with zeros: lanes beyond the last one are computed with it."""
 HELD = "\xa0"
 """A blank at which no line ends."""
 
@@ -133,6 +135,13 @@ class CSolver(SolverPrinter):
         lines = textwrap.wrap(start, WIDTH, subsequent_indent="    ")
         return [*(x.replace(HELD, " ") for x in lines), "{"]
 
+    def function(self, item: Function) -> Lines:
+        """Return a function."""
+        lines = super().function(item)
+        if any("lane < all;" in line for line in lines):
+            lines.insert(lines.index("{") + 1, "    const size_t all = _abreast(lanes);")
+        return lines
+
     # ------------------------------------------------------------ loops over lanes
 
     def block(self, statements: Sequence[Statement]) -> list[Lines]:
@@ -179,9 +188,13 @@ class CSolver(SolverPrinter):
         self.inside = True
         inner = [line for x in group for line in self.statement(x)]
         self.inside = False
-        limit = "lanes" if self.own.is_lanewise else "LANES"
+        # What is given may end with the last lane.
+        is_given = any(x.is_parameter and x.type.is_lane for x in used)
+        rounded = "lanes" if is_given else "all"
+        limit = rounded if self.own.is_lanewise else "LANES"
         head = f"for (size_t lane = 0; lane < {limit}; lane++)"
-        arrays = [[f"double {x.name}[LANES];"] for x in beyond]
+        cleared = " = { 0 }" if is_given else ""
+        arrays = [[f"double {x.name}[LANES]{cleared};"] for x in beyond]
         if len(inner) == 1:
             return [*arrays, [head, f"    {inner[0]}"]]
         return [*arrays, [f"{head} {{", *(f"    {x}" for x in inner), "}"]]
@@ -193,7 +206,8 @@ class CSolver(SolverPrinter):
         variable, value = node.variable, node.value
         name, kind = variable.name, variable.type
         if kind.base in self.structs:
-            return [f"{self.kind(kind.base)} {name};"]
+            cleared = " = { 0 }" if kind.base in CLEARED else ""
+            return [f"{self.kind(kind.base)} {name}{cleared};"]
         if self.is_zero(node):
             return [f"double {name}[LANES] = {{ 0 }};"]
         if kind.dims and not kind.is_lane:

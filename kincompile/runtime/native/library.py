@@ -46,7 +46,11 @@ FLAGS = (
 OWN = ("-D_WITHOUT_START",)
 """Flags of the runtime's libraries: it has a start of its own."""
 
-LARGEST_VECTORIZED = 300_000
+VECTORIZED = ("-O3", "-D_WHOLE_REGISTERS", "-fno-ipa-cp-clone", "-fno-inline-functions")
+"""In full, but for copies of functions that the code does not ask for: a loop over points is then
+compiled once. Without the last three gcc takes three times as long for the same speed."""
+
+LARGEST_VECTORIZED = 302_000
 """Characters of source up to which it is optimized in full, an angle's cosine and sine, which are
 written in line, counted as ANGLE, and the start, which is left out, with 28,000. In full takes 2 s
 for 9 coordinates in the plane, 6 s for 27, and 7 s for three bodies in space: gcc combines
@@ -75,7 +79,7 @@ def library(name: str, files: Mapping[str, str], fingerprint: str) -> ctypes.CDL
     of itself. An `UnsupportedError` says what is wrong with the compiler.
     """
     source = next(iter(files.values()))
-    command = (*_compiler(), _level(source), *FLAGS, *OWN, *_machine_flags())
+    command = (*_compiler(), *_level(source), *FLAGS, *OWN, *_machine_flags())
     digest = hashlib.sha256()
     for part in (*command, _version(command[0]), _processor(), *files, *files.values()):
         digest.update(part.encode() + b"\0")
@@ -116,20 +120,20 @@ def shared_library(files: Mapping[str, str]) -> bytes | None:
         )
         return None
     # Points come one by one: loops over many of them, which -O3 is for, gain nothing.
-    level = min(_level(max(files.values(), key=len)), "-O1")
-    command = (*compiler, level, *FLAGS, "-fvisibility=hidden")
+    level = min(_level(max(files.values(), key=len)), ("-O1",))
+    command = (*compiler, *level, *FLAGS, "-fvisibility=hidden")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as temporary:
         built = _built(command, Path(temporary), files)
         _try(built, next(iter(files)))
         return built.read_bytes()
 
 
-def _level(source: str) -> str:
-    """Return how far code is optimized: as far as it does not take a minute."""
+def _level(source: str) -> tuple[str, ...]:
+    """Return the flags that say how far code is optimized: as far as it does not take a minute."""
     if max(map(len, source.split("\n}\n"))) > LONGEST_OPTIMIZED:
-        return "-O0"
+        return ("-O0",)
     is_large = len(source) + ANGLE * source.count("cos_sin(") > LARGEST_VECTORIZED
-    return "-O1" if is_large else "-O3"
+    return ("-O1",) if is_large else VECTORIZED
 
 
 def _compiler() -> tuple[str, ...]:
