@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
@@ -146,6 +147,9 @@ def print_data(text: str) -> None:
         raise InputError(f"cannot write to stdout: {error.strerror}") from error
 
 
+_ANGLE = re.compile(r"(-?\d+(?:\.\d+)?(?:e[+-]?\d+)?) rad\b(?!/)")
+
+
 def end_unsolved(context: click.Context, message: str) -> NoReturn:
     """Say what was not solved, and end the command with the exit code of that."""
     click.echo(f"Error: {message}", err=True)
@@ -176,4 +180,12 @@ def give_motion(
         kc.write(written, output, angle_unit=angle_unit)
         click.echo(f"{text}\nWrote {output}", err=True)
     if not solution.success:
-        end_unsolved(context, reasons or solution.message)
+        end_unsolved(context, shown_angles(reasons or solution.message, angle_unit))
+
+
+def shown_angles(message: str, angle_unit: str) -> str:
+    """Return a message with its angles in the unit in which angles are shown."""
+    from kincompile.runtime.results.columns import shown_unit  # NumPy
+
+    unit, factor = shown_unit("rad", angle_unit)
+    return _ANGLE.sub(lambda found: f"{factor * float(found[1]):.4g} {unit}", message)

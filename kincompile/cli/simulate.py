@@ -90,5 +90,6 @@ def command(
             through=motion.through,
             progress=progress,
         )
-    text = f"{summary(solution, angle_unit)}\n{solution.message}"
+    said = shared.shown_angles(solution.message, angle_unit)
+    text = f"{summary(solution, angle_unit)}\n{said}"
     shared.give_motion(context, solution, text, output, angle_unit, has_forces)

@@ -1,5 +1,7 @@
 import csv
 import json
+import math
+import re
 
 import numpy as np
 import pytest
@@ -221,3 +223,22 @@ def test_that_outputs_come_before_coordinates(kincompile, tmp_path):
     assert [x for x in titles if x in ("output", "coordinate", "driver")] == [
         "output", "coordinate", "driver",
     ]  # fmt: skip
+
+
+def test_that_a_message_has_degrees_where_they_are_asked_for(kincompile, tmp_path):
+    path = tmp_path / "bars.toml"
+    path.write_text(BARS)
+    options = ("run", path, "--set", "r=1.8", "--points", "41")
+    in_radians, in_degrees = kincompile(*options), kincompile(*options, "--deg")
+    ranges = [
+        re.search(r"it can be (\S+) (rad|deg) at least, (\S+) (rad|deg) at most", done.stderr)
+        for done in (in_radians, in_degrees)
+    ]
+    (low, unit, high, _), (low_deg, unit_deg, high_deg, _) = (found.groups() for found in ranges)
+    assert (unit, unit_deg) == ("rad", "deg")
+    assert float(low_deg) == pytest.approx(math.degrees(float(low)), rel=1e-3)
+    assert float(high_deg) == pytest.approx(math.degrees(float(high)), rel=1e-3)
+    # The law of cosines: A is at its farthest from C when coupler and rocker are in line.
+    at_most = math.acos((1.8**2 + 4**2 - 5.5**2) / (2 * 1.8 * 4))
+    assert float(high) == pytest.approx(at_most, rel=1e-3)
+    assert " rad" not in in_degrees.stderr
