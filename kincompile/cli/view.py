@@ -65,6 +65,8 @@ def command(
     is_page = Path(output).suffix in (".html", ".htm")
     if is_page:
         require_writable(output)
+    elif Path(output).suffix and not Path(output).is_dir():
+        raise InputError(f"{output} is not the name of a page: end it in .html, or name a folder")
     if is_page and len(models) > 1:
         raise InputError(f"{output}: {len(models)} pages do not go into one file; name a folder")
     read = [read_model(model) for model in models]

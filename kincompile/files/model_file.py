@@ -80,7 +80,7 @@ class _ModelReader(BodyReader):
         if not self._is_model(data):
             return None
         fields = form.fields_of("model", self.words.count)
-        self.has_fields((), data, fields)
+        self.has_fields((), {"kincompile": form.VERSION, **data}, fields)
         name = self.name(data, (), "the model") or "model"
         given = [self._parameter(*item) for item in self.rows(data, "parameters")]
         parameters = [item for item in given if item]
@@ -136,6 +136,7 @@ class _ModelReader(BodyReader):
             self.problem(
                 (), f"this is not a model for kincompile: one says kincompile = {form.VERSION}"
             )
+            return bool({"constraints", "sketch"} & data.keys())  # it means to be one
         elif type(data["kincompile"]) is not int or data["kincompile"] != form.VERSION:
             given = shown(data["kincompile"])
             self.problem(

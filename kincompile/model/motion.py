@@ -219,3 +219,13 @@ def _check_times(times: Sequence[sympy.Expr], problems: list[str]) -> None:
         if step.is_number and not step > least:
             late, early = number_text(after), number_text(before)
             problems.append(f"times must rise, but {late} follows {early}")
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def __getattr__(name: str) -> Any:
+    """Say how a law of motion is called; they are texts, in files too."""
+    hint = f": write kc.motion.law({name!r})" if name in RISES else suggestion(name, __all__)
+    raise AttributeError(f"kc.motion has no {name!r}{hint}")

@@ -242,3 +242,17 @@ def test_that_a_message_has_degrees_where_they_are_asked_for(kincompile, tmp_pat
     at_most = math.acos((1.8**2 + 4**2 - 5.5**2) / (2 * 1.8 * 4))
     assert float(high) == pytest.approx(at_most, rel=1e-3)
     assert " rad" not in in_degrees.stderr
+
+
+def test_that_a_name_with_another_ending_is_no_name_of_a_page_or_a_module(kincompile, tmp_path):
+    path = tmp_path / "bars.toml"
+    path.write_text(BARS)
+    done = kincompile("view", path, "-o", tmp_path / "bars.png")
+    assert (done.exit_code, done.stderr) == (
+        2,
+        f"Error: {tmp_path / 'bars.png'} is not the name of a page: end it in .html, or name a "
+        "folder\n",
+    )
+    done = kincompile("compile", path, "--target", "javascript", "-o", tmp_path / "out_js")
+    assert (done.exit_code, "does not end in .js: name a file as bars.js" in done.stderr) == (2, 1)
+    assert [item.name for item in tmp_path.iterdir()] == ["bars.toml"]

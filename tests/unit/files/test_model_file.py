@@ -453,3 +453,19 @@ def test_that_a_seed_is_one_that_every_generator_takes():
     target = kc.targets.value("arm.phi", [1.0], [0.5])
     with pytest.raises(kc.InputError, match="a whole number from 0 to 4,294,967,295"):
         kc.fit(toml(ARM), target, bounds={"length": (0.1, 2)}, seed=2**32)
+
+
+def test_that_a_model_without_its_version_says_all_that_is_wrong(tmp_path):
+    path = tmp_path / "arm.toml"
+    path.write_text(
+        'name = "arm"\nbodies = [{ name = "lower arm" }]\n'
+        'constraints = [{ type = "Revolut", name = "A", i = "ground", j = "arm" }]\n'
+    )
+    with pytest.raises(kc.ModelError) as error:
+        kc.read_model(path)
+    first, *others = error.value.problems
+    assert "line 1: this is not a model for kincompile: one says kincompile = 1" in first
+    assert ["line 2: body 'lower arm'" in others[0], "line 3: constraint 'A'" in others[1]] == [
+        1,
+        1,
+    ]

@@ -240,3 +240,11 @@ def test_that_two_tables_of_one_mechanism_are_two():
     solution = kc.solve(kc.compile(m), [0.0, 1.0])
     assert solution["phi_arm"] == pytest.approx([0, 0.5], abs=1e-15)
     assert kc.verify(m).passed
+
+
+def test_that_a_law_that_is_taken_for_a_function_is_named_as_it_is_called():
+    assert dir(kc.motion) == sorted(kc.motion.__all__)
+    with pytest.raises(AttributeError, match=r"write kc\.motion\.law\('cycloidal'\)"):
+        _ = kc.motion.cycloidal
+    with pytest.raises(AttributeError, match="has no 'sequnce'; did you mean 'sequence'"):
+        _ = kc.motion.sequnce
