@@ -106,7 +106,5 @@ def _destination(output: str, emitted: Emitted, target: str) -> tuple[Path, str]
     beside = {Path(name).suffix for name in emitted.companions} - {Path(usual).suffix}
     if path.name in emitted.companions or path.suffix in beside:
         raise InputError(f"{path} is the name of another file that is written; end it as {usual}")
-    if path.suffix != Path(usual).suffix:
-        raise InputError(f"{path} does not end in {Path(usual).suffix}: name a file as {usual}")
     require_writable(path)
     return path.parent, path.name

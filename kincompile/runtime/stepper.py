@@ -79,17 +79,17 @@ class Instant:
     @property
     def q(self) -> Array:
         """The coordinates, shape (n,)."""
-        return self.states[0]
+        return np.asarray(self.states[0])
 
     @property
     def q_dot(self) -> Array:
         """Their rates, shape (n,)."""
-        return self.states[1]
+        return np.asarray(self.states[1])
 
     @property
     def q_ddot(self) -> Array:
         """Their second rates, shape (n,)."""
-        return self.states[2]
+        return np.asarray(self.states[2])
 
     @property
     def success(self) -> bool:
@@ -219,7 +219,7 @@ class Stepper:
         InputError
             When a value has the wrong name, shape, type or is not finite; nothing has changed then.
         """
-        if not isinstance(t, float) or not math.isfinite(t):
+        if type(t) is not float or not math.isfinite(t):
             given = _read(self._code.module, t, None, None)
             t = given.one_time("a stepper takes one time", "kc.solve takes many")
         own = self._p if p is None and not parameters else self._parameters(p, parameters)
@@ -270,13 +270,13 @@ class Stepper:
         code, end = self._code, t + (_reach(t) if is_corner else 0.0)
         inputs = replace(self._inputs, t=np.array([end]), p=p)
         if self._base is not None:
-            q: Array | None = self._base.q
-            if not np.array_equal(p, self._base.p) and (q := self._led(self._base, p)) is None:
+            led = self._base.q if np.array_equal(p, self._base.p) else self._led(self._base, p)
+            if led is None:
                 say = partial(NOT_LED.format, name=code.name, t=self._base.t)
                 nothing = np.full_like(self._base.states, np.nan)
                 return Instant(code, t, p, nothing, Status.NOT_CONVERGED, say)
             times = np.array([self._base.t, end])
-            inputs = replace(inputs, t=times, guess=q, method="march", without_guess=())
+            inputs = replace(inputs, t=times, guess=led, method="march", without_guess=())
         with np.errstate(all="ignore"):
             motion, outcome = follow(inputs)
         states = motion.states[..., -1].copy()

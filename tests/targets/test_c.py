@@ -135,7 +135,9 @@ def test_that_a_point_is_the_same_in_any_company(monkeypatch, tmp_path, quick_co
     rates, times = np.cos(q), np.linspace(0, 1, 70)
     everything = module.kinematics(q, rates, times)
     for n in (1, 2, 3, 4, 5, 31, 33, 34, 35, 67):
-        for found, expected in zip(module.kinematics(q[:n], rates[:n], times[:n]), everything):
+        for found, expected in zip(
+            module.kinematics(q[:n], rates[:n], times[:n]), everything, strict=True
+        ):
             near = 4e-16 * np.maximum(1, np.abs(expected[:n]))
             assert np.all(np.abs(found - expected[:n]) <= near)
         motion = kc.solve(module, np.linspace(8, 9, n), guess=[-0.9, 0.4, 9])

@@ -234,7 +234,9 @@ def test_that_a_message_has_degrees_where_they_are_asked_for(kincompile, tmp_pat
         re.search(r"it can be (\S+) (rad|deg) at least, (\S+) (rad|deg) at most", done.stderr)
         for done in (in_radians, in_degrees)
     ]
-    (low, unit, high, _), (low_deg, unit_deg, high_deg, _) = (found.groups() for found in ranges)
+    (low, unit, high, _), (low_deg, unit_deg, high_deg, _) = (
+        found.groups() for found in ranges if found
+    )
     assert (unit, unit_deg) == ("rad", "deg")
     assert float(low_deg) == pytest.approx(math.degrees(float(low)), rel=1e-3)
     assert float(high_deg) == pytest.approx(math.degrees(float(high)), rel=1e-3)
@@ -244,7 +246,7 @@ def test_that_a_message_has_degrees_where_they_are_asked_for(kincompile, tmp_pat
     assert " rad" not in in_degrees.stderr
 
 
-def test_that_a_name_with_another_ending_is_no_name_of_a_page_or_a_module(kincompile, tmp_path):
+def test_that_a_name_with_another_ending_is_no_name_of_a_page(kincompile, tmp_path):
     path = tmp_path / "bars.toml"
     path.write_text(BARS)
     done = kincompile("view", path, "-o", tmp_path / "bars.png")
@@ -253,6 +255,4 @@ def test_that_a_name_with_another_ending_is_no_name_of_a_page_or_a_module(kincom
         f"Error: {tmp_path / 'bars.png'} is not the name of a page: end it in .html, or name a "
         "folder\n",
     )
-    done = kincompile("compile", path, "--target", "javascript", "-o", tmp_path / "out_js")
-    assert (done.exit_code, "does not end in .js: name a file as bars.js" in done.stderr) == (2, 1)
     assert [item.name for item in tmp_path.iterdir()] == ["bars.toml"]

@@ -465,7 +465,5 @@ def test_that_a_model_without_its_version_says_all_that_is_wrong(tmp_path):
         kc.read_model(path)
     first, *others = error.value.problems
     assert "line 1: this is not a model for kincompile: one says kincompile = 1" in first
-    assert ["line 2: body 'lower arm'" in others[0], "line 3: constraint 'A'" in others[1]] == [
-        1,
-        1,
-    ]
+    assert "line 2: body 'lower arm'" in others[0]
+    assert "line 3: constraint 'A'" in others[1]
