@@ -23,9 +23,10 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from threading import Timer
 from typing import TYPE_CHECKING
 
 from kincompile.errors import InputError, KincompileWarning, UnsupportedError
@@ -33,7 +34,7 @@ from kincompile.names import escaped
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
 COMPILERS = ("cc", "gcc", "clang")
 """Compilers that are looked for where the environment variable CC names none."""
@@ -62,6 +63,9 @@ LONGEST_OPTIMIZED = 400_000
 """Characters of one function up to which it is optimized at all: gcc's choice of registers takes 11
 s for 330,000, and ten minutes for the 1,600,000 of second derivatives of an ankle with four bodies
 in its legs, which take 2 s as they are, and then no longer a point than NumPy does."""
+
+PATIENCE = 1.0
+"""Seconds after which a compiler at work is mentioned."""
 
 TRIAL = "import ctypes, sys; ctypes.CDLL(sys.argv[1])"
 
@@ -247,10 +251,23 @@ def _built(command: tuple[str, ...], folder: Path, files: Mapping[str, str]) -> 
         (folder / name).write_text(text, encoding="utf-8")
     sources = [name for name in files if name.endswith(".c")]
     built = folder / "library.so"
-    _run((*command, "-fPIC", "-shared", *sources, "-o", built.name, "-lm"), folder)
+    with _said(f"Compiling {sources[0]} by {command[0]} ..."):
+        _run((*command, "-fPIC", "-shared", *sources, "-o", built.name, "-lm"), folder)
     if not built.is_file():
         raise UnsupportedError(f"the C compiler {command[0]} wrote no library; {REPAIR}.")
     return built
+
+
+@contextmanager
+def _said(words: str) -> Iterator[None]:
+    """Say what is done where it lasts and someone is at a terminal, as a progress bar does."""
+    timer = Timer(PATIENCE, lambda: sys.stderr.write(f"{words}\n"))
+    if sys.stderr is not None and sys.stderr.isatty():
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _run(command: tuple[str, ...], folder: Path | None) -> subprocess.CompletedProcess[str]:

@@ -2,6 +2,7 @@
 
 import ctypes
 import hashlib
+import io
 import os
 import stat
 import subprocess
@@ -416,3 +417,25 @@ def test_a_process_that_is_killed_while_it_builds_leaves_nothing_to_load(
     assert not cache.exists()
     compiler('exec REAL "$@"')
     assert run_compile() == "[-1.0, 0.0, -0.5]"
+
+
+class Terminal(io.StringIO):
+    """A terminal that keeps what is written."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_that_a_slow_compiler_is_mentioned_once_while_it_runs(compiler, monkeypatch):
+    """On a terminal alone, and not where the library is there already."""
+    monkeypatch.setattr(c_library, "PATIENCE", 0.05)
+    compiler('sleep 1\nexec REAL "$@"')
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    kc.compile(tiny("unseen"), target="c")
+    assert sys.stderr.getvalue() == ""
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    for _ in range(2):
+        assert_right(kc.compile(tiny("slow"), target="c"))
+    (line,) = sys.stderr.getvalue().splitlines()
+    assert line.startswith("Compiling slow.c by ")
+    assert line.endswith("fake-cc ...")
