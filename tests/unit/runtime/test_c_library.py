@@ -430,12 +430,13 @@ def test_that_a_slow_compiler_is_mentioned_once_while_it_runs(compiler, monkeypa
     """On a terminal alone, and not where the library is there already."""
     monkeypatch.setattr(c_library, "PATIENCE", 0.05)
     compiler('sleep 1\nexec REAL "$@"')
-    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    nowhere, terminal = io.StringIO(), Terminal()
+    monkeypatch.setattr(sys, "stderr", nowhere)
     kc.compile(tiny("unseen"), target="c")
-    assert sys.stderr.getvalue() == ""
-    monkeypatch.setattr(sys, "stderr", Terminal())
+    assert nowhere.getvalue() == ""
+    monkeypatch.setattr(sys, "stderr", terminal)
     for _ in range(2):
         assert_right(kc.compile(tiny("slow"), target="c"))
-    (line,) = sys.stderr.getvalue().splitlines()
+    (line,) = terminal.getvalue().splitlines()
     assert line.startswith("Compiling slow.c by ")
     assert line.endswith("fake-cc ...")
