@@ -157,7 +157,7 @@ $(BENCH_READY): $(DEMO_READY)
 
 bench: $(BENCH_READY)
 	@$(BIN)/python -m benchmarks
-	@for part in points analysis space stepper outputs sensitivities forces forward scale variants sweep synthesis page; do $(BIN)/python -m benchmarks.$$part || exit 1; done
+	@for part in points analysis space stepper in_jax outputs sensitivities forces forward scale variants sweep synthesis page; do $(BIN)/python -m benchmarks.$$part || exit 1; done
 
 clean:
 	@rm -rf $(VENV) demo site course docs/made build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache
