@@ -95,7 +95,8 @@ def _destination(output: str, emitted: Emitted, target: str) -> tuple[Path, str]
     """Return the folder to write to, and the name there of the main file."""
     path = Path(output)
     usual = emitted.main
-    if path.is_dir() or not path.suffix:
+    is_device = path.exists() and not path.is_file()
+    if path.is_dir() or not (path.suffix or is_device):
         return path, usual
     other = ENDINGS.get(path.suffix, target)
     if other != target:

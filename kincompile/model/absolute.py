@@ -5,7 +5,7 @@ from __future__ import annotations
 from kincompile.calculus.expressions import Basis, Expression, Perpendicular, dot
 from kincompile.calculus.symbols import C, c, i, s_i
 from kincompile.model import arguments as argument
-from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.arguments import BodyLike, PlaceLike, ValueLike
 from kincompile.model.constraint import Constraint, constraint_type
 
 
@@ -23,7 +23,7 @@ class AbsoluteX(Constraint):
         'm.add(kc.AbsoluteX("wall", block, (0.5, 0), 2.5))',
     )
     body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
+    point: PlaceLike = argument.point("s_i", on="i")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -46,7 +46,7 @@ class AbsoluteY(Constraint):
         'm.add(kc.AbsoluteY("floor", block, (0, -0.5), 0.7))',
     )
     body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
+    point: PlaceLike = argument.point("s_i", on="i")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -93,8 +93,8 @@ class AbsoluteDistance(Constraint):
         'm.add(kc.AbsoluteDistance("rope", boom, (0.5, 0), (0.5, 0.5), 2.2))',
     )
     body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
-    ground_point: PointLike = argument.point("c", on="ground")
+    point: PlaceLike = argument.point("s_i", on="i")
+    ground_point: PlaceLike = argument.point("c", on="ground")
     distance: ValueLike = argument.distance()
 
     @staticmethod

@@ -1,7 +1,7 @@
 """The arguments of constraint types: kinds, types for editors, and how a type declares them.
 
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
 
 declares a field, its symbol in the textbook's formula, and the line that documents it.
 """
@@ -26,7 +26,10 @@ BodyLike: TypeAlias = Body | str
 ValueLike: TypeAlias = Scalar
 """A number, or an expression of parameters; of `t` too, where it is the value of a driver."""
 
-PointLike: TypeAlias = Scalars | str
+PointLike: TypeAlias = Scalars
+"""A pair (xi, eta)."""
+
+PlaceLike: TypeAlias = Scalars | str
 """A pair (xi, eta), or the name of a joint that is drawn on the body."""
 
 ProfileLike: TypeAlias = (

@@ -8,7 +8,7 @@ from __future__ import annotations
 from kincompile.calculus.expressions import Expression, dot, perpendicular
 from kincompile.calculus.symbols import contact_i, contact_j, i, j, s_i, s_j, v_j
 from kincompile.model import arguments as argument
-from kincompile.model.arguments import BodyLike, PointLike, ProfileLike
+from kincompile.model.arguments import BodyLike, PlaceLike, PointLike, ProfileLike
 from kincompile.model.constraint import CamConstraint, constraint_type
 
 
@@ -29,10 +29,10 @@ class CamFollower(CamConstraint):
     row_names = ("x", "y", "tangent")
     contacts = (contact_i, contact_j)
     i: BodyLike = argument.body("i")
-    centre_i: PointLike = argument.point("s_i", on="i", what="Centre of the profile")
+    centre_i: PlaceLike = argument.point("s_i", on="i", what="Centre of the profile")
     profile_i: ProfileLike = argument.profile("rho_i")
     j: BodyLike = argument.body("j")
-    centre_j: PointLike = argument.point("s_j", on="j", what="Centre of the profile")
+    centre_j: PlaceLike = argument.point("s_j", on="j", what="Centre of the profile")
     profile_j: ProfileLike = argument.profile("rho_j")
 
     @staticmethod
@@ -60,10 +60,10 @@ class CamFlatFollower(CamConstraint):
     row_names = ("contact", "tangent")
     contacts = (contact_i,)
     cam: BodyLike = argument.body("i")
-    centre: PointLike = argument.point("s_i", on="i", what="Centre of the profile")
+    centre: PlaceLike = argument.point("s_i", on="i", what="Centre of the profile")
     profile: ProfileLike = argument.profile("rho_i")
     follower: BodyLike = argument.body("j")
-    point: PointLike = argument.point("s_j", on="j", what="Point of the face")
+    point: PlaceLike = argument.point("s_j", on="j", what="Point of the face")
     axis: PointLike = argument.axis("v_j", on="j")
 
     @staticmethod
@@ -89,9 +89,9 @@ class PointFollower(CamConstraint):
     row_names = ("x", "y")
     contacts = (contact_j,)
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
     j: BodyLike = argument.body("j")
-    centre_j: PointLike = argument.point("s_j", on="j", what="Centre of the profile")
+    centre_j: PlaceLike = argument.point("s_j", on="j", what="Centre of the profile")
     profile_j: ProfileLike = argument.profile("rho_j")
 
     @staticmethod

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from kincompile.calculus.expressions import Expression, Norm, Pi, dot, perpendicular
 from kincompile.calculus.symbols import R_i, R_j, i, j, s_j, s_P, s_Q, theta_i, theta_j, unit
 from kincompile.model import arguments as argument
-from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.arguments import BodyLike, PlaceLike, ValueLike
 from kincompile.model.constraint import Constraint, constraint_type
 from kincompile.model.relative import separation
 
@@ -34,11 +34,11 @@ class Gear(Constraint):
         'm.add(kc.Gear("mesh", small, (0, 0), 0.5, 0, large, (0, 0), 1, kc.pi))',
     )
     i: BodyLike = argument.body("i")
-    centre_i: PointLike = argument.point("s_i", on="i", what="Centre")
+    centre_i: PlaceLike = argument.point("s_i", on="i", what="Centre")
     radius_i: ValueLike = argument.radius("R_i")
     theta_i: ValueLike = argument.angle("theta_i", on="i", what="that points at the other gear")
     j: BodyLike = argument.body("j")
-    centre_j: PointLike = argument.point("s_j", on="j", what="Centre")
+    centre_j: PlaceLike = argument.point("s_j", on="j", what="Centre")
     radius_j: ValueLike = argument.radius("R_j")
     theta_j: ValueLike = argument.angle("theta_j", on="j", what="that points back at the same time")
 
@@ -81,11 +81,11 @@ class RackAndPinion(Constraint):
     )
     row_names = ("roll", "pitch")
     rack: BodyLike = argument.body("i")
-    point_p: PointLike = argument.point("s_P", on="i", what="Point P of the pitch line")
-    point_q: PointLike = argument.point("s_Q", on="i", what="Point Q of the pitch line")
+    point_p: PlaceLike = argument.point("s_P", on="i", what="Point P of the pitch line")
+    point_q: PlaceLike = argument.point("s_Q", on="i", what="Point Q of the pitch line")
     theta_rack: ValueLike = argument.angle("theta_i", on="i", what="of the line from P to Q")
     pinion: BodyLike = argument.body("j")
-    centre: PointLike = argument.point("s_j", on="j", what="Centre")
+    centre: PlaceLike = argument.point("s_j", on="j", what="Centre")
     radius: ValueLike = argument.radius("R_j")
     theta_pinion: ValueLike = argument.angle(
         "theta_j", on="j", what="of the radius that meets the line where the pinion is at Q"

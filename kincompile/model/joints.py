@@ -5,7 +5,7 @@ from __future__ import annotations
 from kincompile.calculus.expressions import Expression, Norm, dot, perpendicular
 from kincompile.calculus.symbols import C, i, j, s_i, s_j, v_i, v_j
 from kincompile.model import arguments as argument
-from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.arguments import BodyLike, PlaceLike, PointLike, ValueLike
 from kincompile.model.constraint import Constraint, constraint_type
 from kincompile.model.relative import (
     PointToPoint,
@@ -45,10 +45,10 @@ class PointAndAxis(Constraint):
     """A constraint of an axis of body i and a point on body j; the types are its subclasses."""
 
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
     axis_i: PointLike = argument.axis("v_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
+    point_j: PlaceLike = argument.point("s_j", on="j")
     distance: ValueLike = argument.value()
 
 
@@ -112,10 +112,10 @@ class Translational(Constraint):
     row_names = ("normal", "parallel")
     simpler = (("normal", RelativeAngle), ("parallel", RevoluteTranslational))
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
     axis_i: PointLike = argument.axis("v_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
+    point_j: PlaceLike = argument.point("s_j", on="j")
     axis_j: PointLike = argument.axis("v_j", on="j")
 
     @staticmethod

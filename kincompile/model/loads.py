@@ -20,7 +20,7 @@ from kincompile.calculus.expressions import (
 )
 from kincompile.calculus.symbols import i, j
 from kincompile.model import arguments as argument
-from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.arguments import BodyLike, PlaceLike, PointLike, ValueLike
 from kincompile.model.constraint import constraint_type
 from kincompile.model.load import Load
 
@@ -61,7 +61,7 @@ class Force(Load):
     """A force on a point of a body, whose components are along the fixed axes."""
 
     body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
+    point: PlaceLike = argument.point("s_i", on="i")
     force: PointLike = argument.loads("f", "(F_x, F_y) [force] along the fixed axes")
 
     @classmethod
@@ -76,7 +76,7 @@ class FollowerForce(Load):
     """A force on a point of a body, whose components are along the axes of the body."""
 
     body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
+    point: PlaceLike = argument.point("s_i", on="i")
     force: PointLike = argument.loads("f", "(F_xi, F_eta) [force] along the body's axes")
 
     @classmethod
@@ -109,9 +109,9 @@ class Spring(Load):
 
     source = "Haug 6.2"
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
+    point_j: PlaceLike = argument.point("s_j", on="j")
     stiffness: ValueLike = argument.attribute("k", "Stiffness [force per length]", default=0)
     free_length: ValueLike = argument.attribute(
         "l_0", "Length without force [length]", "length", default=0
@@ -212,10 +212,10 @@ class SliderFriction(Load):
     """
 
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
     axis_i: PointLike = argument.axis("v_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
+    point_j: PlaceLike = argument.point("s_j", on="j")
     force: ValueLike = argument.load("F", "Force of friction when sliding, positive")
     velocity: ValueLike = argument.attribute(
         "v_0", "Velocity [length per s] below which the law is smooth", default=0.001
@@ -244,8 +244,8 @@ class Mass(Load):
     body: BodyLike = argument.body("i")
     mass: ValueLike = argument.attribute("m", "Mass")
     inertia: ValueLike = argument.attribute("J", "Moment of inertia about the centre of mass")
-    centre: PointLike = argument.point("s_C", on="i", what="Centre of mass")
-    gravity: PointLike = argument.point("g", on="ground", what="Acceleration of gravity")
+    centre: PlaceLike = argument.point("s_C", on="i", what="Centre of mass")
+    gravity: PlaceLike = argument.point("g", on="ground", what="Acceleration of gravity")
 
     @classmethod
     def kinetic_energy(cls) -> Scalar:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from kincompile.calculus.expressions import Basis, Expression, Perpendicular, Vector, dot
 from kincompile.calculus.symbols import C, i, j, s_i, s_j
 from kincompile.model import arguments as argument
-from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.arguments import BodyLike, PlaceLike, ValueLike
 from kincompile.model.constraint import Constraint, constraint_type
 
 
@@ -19,9 +19,9 @@ class PointToPoint(Constraint):
     """A constraint of a point on body i and a point on body j; the types are its subclasses."""
 
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
+    point_j: PlaceLike = argument.point("s_j", on="j")
 
 
 @constraint_type

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from kincompile.model import arguments as argument
-from kincompile.model.arguments import BodyLike, PointLike
+from kincompile.model.arguments import BodyLike, PlaceLike
 from kincompile.model.constraint import Constraint, constraint_type
 from kincompile.model.expressions import as_sympy, evaluate
 from kincompile.space.bodies import SPATIAL
@@ -116,6 +116,6 @@ class SpatialPoints(SpatialConstraint):
     """A constraint of a point on body i and a point on body j; the types are its subclasses."""
 
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
+    point_j: PlaceLike = argument.point("s_j", on="j")

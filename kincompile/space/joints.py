@@ -20,7 +20,7 @@ from kincompile.calculus.expressions import (
 from kincompile.calculus.space import f_i, f_j, g_i, g_j, h_i, h_j, i, j, separation
 from kincompile.calculus.symbols import C, contact_i
 from kincompile.model import arguments as argument
-from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.arguments import BodyLike, PlaceLike, PointLike, ValueLike
 from kincompile.model.constraint import CamConstraint, constraint_type
 from kincompile.space.constraint import SpatialConstraint, SpatialPoints
 
@@ -100,10 +100,10 @@ class AxisAndPoint(SpatialConstraint):
     """A constraint of an axis of body i and a point of body j; the types are its subclasses."""
 
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
     axis_i: PointLike = argument.axis("h_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
+    point_j: PlaceLike = argument.point("s_j", on="j")
 
 
 @constraint_type
@@ -125,10 +125,10 @@ class InPlane(SpatialConstraint):
 
     source = "Haug 9.4"
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
     normal_i: PointLike = argument.axis("h_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
+    point_j: PlaceLike = argument.point("s_j", on="j")
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -279,11 +279,11 @@ class Triads(SpatialConstraint):
     """A joint of a triad of body i and a triad of body j; the types are its subclasses."""
 
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
     axis_i: PointLike = argument.axis("h_i", on="i")
     cross_i: PointLike = argument.cross("f_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
+    point_j: PlaceLike = argument.point("s_j", on="j")
     axis_j: PointLike = argument.axis("h_j", on="j")
     cross_j: PointLike = argument.cross("f_j", on="j")
 

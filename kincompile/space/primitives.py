@@ -8,7 +8,7 @@ from kincompile.calculus.expressions import Basis, Expression, dot
 from kincompile.calculus.space import AXES, a_i, a_j, c, i, j, s_i, separation, u
 from kincompile.calculus.symbols import C
 from kincompile.model import arguments as argument
-from kincompile.model.arguments import BodyLike, PointLike, ValueLike
+from kincompile.model.arguments import BodyLike, PlaceLike, PointLike, ValueLike
 from kincompile.model.constraint import constraint_type
 from kincompile.space.constraint import SpatialConstraint, SpatialPoints
 
@@ -50,10 +50,10 @@ class Dot2(SpatialConstraint):
 
     source = "Haug 9.4"
     i: BodyLike = argument.body("i")
-    point_i: PointLike = argument.point("s_i", on="i")
+    point_i: PlaceLike = argument.point("s_i", on="i")
     vector_i: PointLike = argument.vector("a_i", on="i")
     j: BodyLike = argument.body("j")
-    point_j: PointLike = argument.point("s_j", on="j")
+    point_j: PlaceLike = argument.point("s_j", on="j")
     value: ValueLike = argument.value()
 
     @staticmethod
@@ -118,7 +118,7 @@ class OnePoint(SpatialConstraint):
     """A constraint of a point on a body; the types are its subclasses."""
 
     body: BodyLike = argument.body("i")
-    point: PointLike = argument.point("s_i", on="i")
+    point: PlaceLike = argument.point("s_i", on="i")
 
 
 @constraint_type
@@ -163,7 +163,7 @@ class AbsoluteDistance(OnePoint):
     """The distance from a ground point to a point on a body is C > 0."""
 
     source = "Haug 9.4"
-    ground_point: PointLike = argument.point("c", on="ground")
+    ground_point: PlaceLike = argument.point("c", on="ground")
     distance: ValueLike = argument.distance()
 
     @staticmethod

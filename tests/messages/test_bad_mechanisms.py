@@ -90,7 +90,7 @@ BAD = {
     ),
     "one number": (revolute(1.5), "point_i: 1.5 is not a pair"),
     "no point": (revolute(None), "point_i: None is not a pair"),
-    "text": (revolute("12"), "point_i: '12' is not a pair"),
+    "text": (revolute("12"), "point_i: no joint '12' is drawn on this body; give one"),
     "set": (revolute({1, 2}), r"point_i: {1, 2} is not a pair"),
     "generator": (revolute(k for k in (1, 2)), "point_i: <generator .* is not a pair"),
     "matrix": (revolute(np.ones((2, 2))), "point_i: array.* is not a number or a SymPy expression"),

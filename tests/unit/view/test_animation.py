@@ -235,5 +235,5 @@ def test_that_a_motion_without_a_position_says_why(example_named):
 
 def test_that_missing_matplotlib_is_named(motion, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(kc.UnsupportedError, match=r"matplotlib is not .*'kincompile\[plot\]'"):
+    with pytest.raises(kc.UnsupportedError, match=r"matplotlib is not .*'\.\[plot\]'"):
         kc.animate(motion)

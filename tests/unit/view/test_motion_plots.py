@@ -214,5 +214,5 @@ def test_that_columns_are_indexed_by_the_same_names(arm):
 
 def test_that_missing_matplotlib_is_named(arm, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(kc.UnsupportedError, match=r"matplotlib is not .*'kincompile\[plot\]'"):
+    with pytest.raises(kc.UnsupportedError, match=r"matplotlib is not .*'\.\[plot\]'"):
         arm.plot("phi_bar")
