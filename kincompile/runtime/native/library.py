@@ -54,7 +54,7 @@ compiled once. Without the last three gcc takes three times as long for the same
 LARGEST_VECTORIZED = 302_000
 """Characters of source up to which it is optimized in full, an angle's cosine and sine, which are
 written in line, counted as ANGLE, and the start, which is left out, with 28,000. In full takes 2 s
-for 9 coordinates in the plane, 6 s for 27, and 7 s for three bodies in space: gcc combines
+for 9 coordinates in the plane, and some 5 s for three bodies in space: gcc combines
 instructions in time that grows with the square of a function's length. Beyond, code runs at half to
 a quarter of the speed, and 99 coordinates take 3 s instead of minutes."""
 ANGLE = 3_000
