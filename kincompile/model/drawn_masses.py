@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 from kincompile.model.expressions import (
@@ -103,5 +104,20 @@ def _plate(
     """Return those of a plate with the joints as its corners."""
     if "width" in known:
         raise ShapeError("a width is that of a straight bar; a plate has a thickness")
+    if _crosses([complex(*(number(part, values) for part in place)) for place in places]):
+        raise ShapeError("its edges cross; name its joints in their order around the plate")
     area, centre, second = plate([(as_sympy(xi), as_sympy(eta)) for xi, eta in places])
     return (area if number(area, values) > 0 else -area), centre, second / area
+
+
+def _crosses(corners: Sequence[complex]) -> bool:
+    """Return whether two edges of a polygon cross that have no corner in common."""
+
+    def side(a: complex, b: complex, c: complex) -> float:
+        return ((b - a).conjugate() * (c - a)).imag
+
+    edges = [*zip(corners, [*corners[1:], corners[0]], strict=True)]
+    return any(
+        side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0
+        for (a, b), (c, d) in combinations(edges, 2)
+    )

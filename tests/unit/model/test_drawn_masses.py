@@ -155,11 +155,14 @@ def test_that_plates_and_bars_in_space_say_what_they_lack():
     s.joints(A=(1, 0), P=(2, 0), Q=(0, 1))
     s.link("wide", "A P Q", mass=1, width=1)
     s.link("thin", "O A Q", density=1)
+    s.joints(R=(1, 1))
+    s.link("crossed", "O R A Q", mass=1)
     with pytest.raises(kc.ModelError) as error:
         s.mechanism()
     for message in (
         "link 'wide': a width is that of a straight bar; a plate has a thickness",
         "link 'thin': a density needs a thickness; give thickness=...",
+        "link 'crossed': its edges cross; name its joints in their order around the plate",
     ):
         assert message in str(error.value)
     s = spatial.Sketch("bars")
