@@ -51,9 +51,8 @@ def emit_transmission(
     A start says which numbers it has for one point at a time.
     """
     one = None if start is None else load_one_transmission(target, start)
-    language, owner = one or load_transmission(target), load_target(target)
-    if start is not None:
-        owner = load_one(target, start)
+    language = one or load_transmission(target)
+    owner = load_target(target) if start is None else load_one(target, start)
     program = code.code.program
     reserved = (*owner.RESERVED, *language.RESERVED, *OWN, program.name)
     table = NameTable((*reserved, *program.tables))

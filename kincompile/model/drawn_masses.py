@@ -82,8 +82,8 @@ def known_masses(
             known[name] = as_expression(known[name])
         except NotAnExpressionError as error:
             raise ShapeError(f"{name}: {error}; give a number, or an expression") from None
-        if not number(known[name], values) > 0:
-            size = number(known[name], values)
+        size = number(known[name], values)
+        if not size > 0:
             raise ShapeError(f"the {name} is {size:g}; give a positive one, of declared parameters")
     if known and ("mass" in known) == ("density" in known):
         raise ShapeError(f"give its mass, or its density and {section}: one of the two")

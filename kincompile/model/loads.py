@@ -244,8 +244,8 @@ class Mass(Load):
     body: BodyLike = argument.body("i")
     mass: ValueLike = argument.attribute("m", "Mass")
     inertia: ValueLike = argument.attribute("J", "Moment of inertia about the centre of mass")
-    centre: PlaceLike = argument.point("s_C", on="i", what="Centre of mass")
-    gravity: PlaceLike = argument.point("g", on="ground", what="Acceleration of gravity")
+    centre: PointLike = argument.point("s_C", on="i", what="Centre of mass")
+    gravity: PointLike = argument.point("g", on="ground", what="Acceleration of gravity")
 
     @classmethod
     def kinetic_energy(cls) -> Scalar:

@@ -25,7 +25,7 @@ from kincompile.calculus.expressions import (
 from kincompile.calculus.space import AXES, f_i, f_j, g_i, g_j, i, j
 from kincompile.model import arguments as argument
 from kincompile.model import loads
-from kincompile.model.arguments import BodyLike, PlaceLike, PointLike, ValueLike
+from kincompile.model.arguments import BodyLike, PointLike, ValueLike
 from kincompile.model.constraint import constraint_type
 from kincompile.model.load import Load
 from kincompile.space.bodies import SPATIAL
@@ -218,11 +218,11 @@ class Mass(SpatialLoad):
 
     body: BodyLike = argument.body("i")
     mass: ValueLike = argument.attribute("m", "Mass")
-    row_1: PlaceLike = argument.point("J_1", on="i", what="First row of the inertia")
-    row_2: PlaceLike = argument.point("J_2", on="i", what="Second row of the inertia")
-    row_3: PlaceLike = argument.point("J_3", on="i", what="Third row of the inertia")
-    centre: PlaceLike = argument.point("s_C", on="i", what="Centre of mass")
-    gravity: PlaceLike = argument.point("g", on="ground", what="Acceleration of gravity")
+    row_1: PointLike = argument.point("J_1", on="i", what="First row of the inertia")
+    row_2: PointLike = argument.point("J_2", on="i", what="Second row of the inertia")
+    row_3: PointLike = argument.point("J_3", on="i", what="Third row of the inertia")
+    centre: PointLike = argument.point("s_C", on="i", what="Centre of mass")
+    gravity: PointLike = argument.point("g", on="ground", what="Acceleration of gravity")
 
     @classmethod
     def kinetic_energy(cls) -> Scalar:
