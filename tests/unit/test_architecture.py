@@ -43,6 +43,7 @@ FLOORS = {
     "further": 8,
     "compiler": 9,
     "spatial": 9,
+    "classical": 10,
     "sweeps": 10,
     "verification": 10,
     "view": 10,

@@ -1,0 +1,1 @@
+"""Classical linkages as drawings, and exact synthesis: dimensions from poses and points."""
