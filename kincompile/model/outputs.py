@@ -161,10 +161,22 @@ def transmission_angle(before: AnyPoint, joint: AnyPoint, after: AnyPoint) -> sy
 def velocity_ratio(output: Scalar, by: Scalar) -> sympy.Expr:
     """Return the ratio of the rates of two outputs, of coordinates, or of an output to a driver.
 
-    Without friction the ratio of forces is its reciprocal: the mechanical advantage. It is not
-    defined where `by` is at rest.
+    It is not defined where `by` is at rest.
     """
     return _expression(rate(_scalar(output)) / rate(_scalar(by)))
+
+
+def mechanical_advantage(output: Scalar, driver: Scalar) -> sympy.Expr:
+    """Return the force that an output gives by the force that a driver takes.
+
+    Without friction, masses and other loads the power that goes in comes out,
+    F_in u_dot = F_out y_dot, so that it is u_dot / y_dot, the reciprocal of `velocity_ratio`:
+    positive where the output pushes the way that y grows while the driver pushes the way that u
+    grows. The forces belong to y and u: of an angle it is a torque. Its unit is that of u by that
+    of y, 1/mm for an angle that drives a length in mm. It has no bound at a dead point of the
+    output.
+    """
+    return velocity_ratio(driver, output)
 
 
 def _expression(found: object) -> sympy.Expr:

@@ -20,11 +20,21 @@ from kincompile.model.expressions import as_sympy
 from kincompile.model.outputs import AnyPoint, between, coordinates, length, scalar_product
 from kincompile.model.outputs import acceleration as acceleration
 from kincompile.model.outputs import distance as distance
+from kincompile.model.outputs import mechanical_advantage as mechanical_advantage
 from kincompile.model.outputs import speed as speed
 from kincompile.model.outputs import transmission_angle as transmission_angle
 from kincompile.model.outputs import velocity_ratio as velocity_ratio
 from kincompile.model.points import rate as rate
 from kincompile.space.bodies import require_three
+from kincompile.space.suspension import camber as camber
+from kincompile.space.suspension import caster as caster
+from kincompile.space.suspension import kingpin as kingpin
+from kincompile.space.suspension import motion_ratio as motion_ratio
+from kincompile.space.suspension import roll_centre_height as roll_centre_height
+from kincompile.space.suspension import scrub_radius as scrub_radius
+from kincompile.space.suspension import toe as toe
+from kincompile.space.suspension import track as track
+from kincompile.space.suspension import trail as trail
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -290,3 +290,27 @@ def test_measures_of_variants_together_are_those_of_each_alone(monkeypatch):
                 if (value := getattr(one, name)) is not None:
                     assert getattr(got, name) == pytest.approx(value, rel=1e-7, abs=1e-8)
     assert count < (len(looks) - count) / 5  # the last ones alone
+
+
+def test_the_mechanical_advantage_is_the_ratio_of_forces():
+    """Of a slider-crank with a load on the slider, against the torque that holds its crank."""
+    s = kc.Sketch("press", length_unit="mm", points=9)
+    s.ground(O=(0, 0))
+    s.joints(A=(60, 0), B=(260, 0))
+    s.link("crank", "O A", 60)
+    s.link("rod", "A B", 200)
+    s.slider("ram", "B", along=(1, 0))
+    s.drive("crank", 0.4 + kc.pi / 2 * kc.t)
+    m = s.mechanism()
+    bodies = {body.name: body for body in m.bodies}
+    crank, ram = bodies["crank"].phi, bodies["ram"].x
+    m.output("gain", kc.outputs.mechanical_advantage(ram, crank), "1/mm")
+    m.add(kc.Force("load", bodies["ram"], (0, 0), (-500, 0)))
+    found = kc.solve(kc.compile(m), np.linspace(0, 1, 9))
+    phi = found["crank.phi"]
+    ratio = -60 * (
+        np.sin(phi) + 60 * np.sin(phi) * np.cos(phi) / np.sqrt(200**2 - (60 * np.sin(phi)) ** 2)
+    )
+    np.testing.assert_allclose(found["gain"], 1 / ratio, rtol=1e-12)
+    torque = kc.forces(found)["drive_crank.drive"]  # [N mm]: what the driver puts in
+    np.testing.assert_allclose(500 / torque, found["gain"], rtol=1e-12)

@@ -260,19 +260,26 @@ def test_double_wishbone_with_steering(rack: float) -> None:
     for k, time in enumerate(t):
         height = 0.3 + 0.06 * (time - 1)
         (c, f, foot), spin = suspension(height, rack)
+        up = f - c
+        ground = c + (foot[2] - c[2]) / up[2] * up  # where the steering axis meets the road
         expected = {
             "camber": -np.arcsin(spin[2]),
             "toe": np.arctan2(spin[0], spin[1]),
             "caster": np.arctan2(c[0] - f[0], f[2] - c[2]),
+            "kingpin": np.arctan2(c[1] - f[1], f[2] - c[2]),
+            "scrub": foot[1] - ground[1],
+            "trail": ground[0] - foot[0],
             "track": 2 * foot[1],
         }
-        step = 1e-5
-        (_, _, high), _ = suspension(height + step, rack)
-        (_, _, low), _ = suspension(height - step, rack)
         for name, value in expected.items():
             assert found[name][k] == pytest.approx(value, abs=1e-10), name
+        step, strut = 1e-5, np.array([0.02, 0.5, 0.62])
+        (c_high, _, high), _ = suspension(height + step, rack)
+        (c_low, _, low), _ = suspension(height - step, rack)
         slope = (high[1] - low[1]) / (high[2] - low[2])
-        assert found["roll_centre"][k] == pytest.approx(foot[2] + foot[1] * slope, abs=1e-7)
+        assert found["roll_centre"][k] == pytest.approx(foot[1] * slope, abs=1e-7)
+        shorter = np.linalg.norm(strut - c_low) - np.linalg.norm(strut - c_high)
+        assert found["motion_ratio"][k] == pytest.approx(shorter / (2 * step), abs=1e-7)
 
 
 def position(found: Any, body: str) -> Any:
