@@ -2,6 +2,7 @@
 
 ``python -m benchmarks.synthesis`` fits a four-bar to five points with prescribed crank angles, to
 the function y = x^1.5 on 1..4 and to Hoeken's straight line. Limits are the best published errors.
+Five poses of a crank-rocker go to `kc.synthesis` and to pylinkage's `motion_generation`.
 pylinkage's particle swarm gets the same five points, bounds and limits; its positions are those of
 the closed form in plain floats, which is faster than any linkage of its own.
 """
@@ -157,22 +158,57 @@ def swarm() -> Row:
     )
 
 
+def coupler_poses() -> Any:
+    """Return five poses (5, 3) of the coupler of a crank-rocker 2 : 4 : 2.7 : 3.7."""
+    module = kc.compile(four_bar("crank_rocker"))
+    motion = kc.solve(module, np.radians([10, 40, 80, 120, 150]))
+    return np.column_stack([motion[name] for name in ("P.x", "P.y", "rod.phi")])
+
+
+def all_four_bars(poses: Any) -> tuple[list[str], float]:
+    """Return the row of `kc.synthesis`, and how far its best linkage is from the poses."""
+    begun = time.perf_counter()
+    found = kc.synthesis.four_bars(poses)
+    working = [item for item in found if item.passage and item.passage.works]
+    worst = max(item.passage.deviation for item in working if item.passage)
+    seconds = f"{time.perf_counter() - begun:.2f}"
+    return ["`kc.synthesis`", f"{len(found)}", f"{len(working)}", f"{worst:.1e}", seconds], worst
+
+
+def theirs(poses: Any) -> list[str]:
+    """Return the row of pylinkage, which tests no motion."""
+    require(optional("pylinkage"), "pylinkage")
+    from pylinkage.synthesis import Pose, motion_generation
+
+    begun = time.perf_counter()
+    given = [Pose(*row) for row in poses.tolist()]
+    found = motion_generation(given, max_solutions=None, require_grashof=False)
+    seconds = f"{time.perf_counter() - begun:.2f}"
+    return ["pylinkage", f"{len(found.solutions)}", "", "", seconds]
+
+
 def main() -> None:
     """Measure and print."""
     before = machine.load()
     ours, others = path(), [function(), line()]
-    rows = [ours]
+    poses = coupler_poses()
+    exact, off = all_four_bars(poses)
+    rows, five = [ours], [exact]
     try:
         rows.append(swarm())
+        five.append(theirs(poses))
     except Skipped as reason:
         print(f"pylinkage is left out: {reason}")
     heads = ("case", "error", "evaluations", "s")
     print_table("Five points with prescribed angles", heads, (row.cells() for row in rows))
+    heads_of_five = ("five poses", "four-bars", "work", "off the poses", "s")
+    print_table("Five poses of a crank-rocker, crank at 10 to 150 degrees", heads_of_five, five)
     print_table("Function and straight line", heads, (row.cells() for row in others))
     targets = [
         Target("five points, sum of squares", ours.error, "at most", BEST_PATH * (1 + 1e-9)),
         Target("function, largest error", others[0].error, "at most", BEST_FUNCTION, "deg"),
         Target("line, deviation by length", others[1].error, "at most", BEST_LINE),
+        Target("five poses, off them", off, "at most", 1e-9),
     ]
     print_targets("Synthesis: best published", targets)
     print(f"{machine.description()}. Load before {before}, after {machine.load()}.")

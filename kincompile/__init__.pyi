@@ -7,6 +7,7 @@ are those of the catalogue.
 from kincompile.checker.compare import compare as compare
 from kincompile.checker.compare import compare_file as compare_file
 from kincompile.classical import linkages as linkages
+from kincompile.classical import synthesis as synthesis
 from kincompile.compiler import compile as compile  # noqa: A004
 from kincompile.compiler import emit as emit
 from kincompile.compiler import inspect as inspect
