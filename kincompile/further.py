@@ -47,6 +47,7 @@ def makers_of(
     makers: dict[Kind[Any], Callable[..., Any]] = {
         kinds.POINTS: partial(_joint_points, system),
         kinds.DRIVERS: lambda: system.drivers_at,
+        kinds.JOINTS: partial(_joints, system),
     }
     if len(system.coordinates) <= LARGEST_REDUNDANT:
         makers[kinds.UNDRIVEN] = partial(_undriven, system)
@@ -58,7 +59,6 @@ def makers_of(
     makers[kinds.SENSITIVE] = partial(_with_sensitivities, code.program)
     if system.loads:
         makers[kinds.FORCES] = partial(_forces, code, target)
-        makers[kinds.JOINTS] = partial(_joints, system)
         makers[kinds.DYNAMICS] = partial(_dynamics, code, system, target)
         makers[kinds.SLOPES] = partial(_slopes, compiled, code, target)
     return makers

@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 import click
 
 import kincompile as kc
-from kincompile.cli.shared import INTERRUPTED, USAGE_OR_MODEL
+from kincompile.cli.shared import INTERRUPTED, USAGE_OR_MODEL, on_screen
 from kincompile.errors import InternalError, KincompileError
 from kincompile.names import escaped_lines
 
@@ -82,7 +82,7 @@ def _end(message: str, code: int) -> NoReturn:
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Write a warning to stderr as a message, without the line of code that gave it."""
-    click.echo(escaped_lines(f"Warning: {message}"), err=True)
+    click.echo(on_screen(escaped_lines(f"Warning: {message}")), err=True)
 
 
 @click.group(

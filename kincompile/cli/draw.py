@@ -10,7 +10,15 @@ import numpy as np
 
 import kincompile as kc
 from kincompile.cli.motion import Motion, motion_options
-from kincompile.cli.shared import end_unsolved, output_option, read_model, require_output
+from kincompile.cli.shared import (
+    end_unsolved,
+    output_option,
+    read_model,
+    reasons_of,
+    require_output,
+    verbose_option,
+    warn_of_branch,
+)
 from kincompile.errors import InputError
 
 if TYPE_CHECKING:
@@ -37,6 +45,7 @@ STILL, MOVING = (".svg", ".dxf"), (".svg", ".gif", ".mp4", ".glb")
     help="Show a mechanism in space as an .svg from the front, side or top.  [default: isometric]",
 )
 @motion_options
+@verbose_option
 @click.pass_context
 def command(
     context: click.Context,
@@ -47,6 +56,7 @@ def command(
     true_size: bool,
     view: str | None,
     motion: Motion,
+    verbose: bool,
 ) -> None:
     """Draw MODEL in motion, or at one time, for slides and for CAD.
 
@@ -75,8 +85,9 @@ def command(
         else:
             kc.animate(solution, output, trace=named)
         click.echo(f"Wrote {output}", err=True)
+    warn_of_branch(solution.doubt)
     if not solution.success:
-        end_unsolved(context, solution.message)
+        end_unsolved(context, reasons_of(solution, is_whole=verbose))
 
 
 def _is_still(output: str, at: float | None, true_size: bool) -> bool:

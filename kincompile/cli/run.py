@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,6 +17,7 @@ from kincompile.names import listed
 from kincompile.runtime.results.write import require_known_suffix, summary, variant_named
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from types import ModuleType
 
     import numpy as np
@@ -33,6 +35,7 @@ MOST_REASONS = 3
 @shared.deg_option("Show and write angles in degrees.")
 @click.option("--forces", "has_forces", is_flag=True, help="Reactions and drivers' torques too.")
 @shared.output_option("Write the motion: .csv, .npz or .json.", required=False)
+@shared.verbose_option
 @click.pass_context
 def command(
     context: click.Context,
@@ -44,6 +47,7 @@ def command(
     angle_unit: str,
     has_forces: bool,
     output: str | None,
+    verbose: bool,
 ) -> None:
     """Solve the motion of MODEL over time and summarise it.
 
@@ -73,9 +77,11 @@ def command(
         solution = kc.solve(
             module, times, numbers | sweeps, product=product, progress=progress, **options
         )
-        reasons = _reasons(solution, module, times, options) if sweeps else ""
+        say = partial(shared.reasons_of, angle_unit=angle_unit, is_whole=verbose, between=" ")
+        reasons = _reasons(solution, module, times, options, say) if sweeps else ""
     text = summary(solution, angle_unit)
-    shared.give_motion(context, solution, text, output, angle_unit, has_forces, reasons)
+    given = text, output, angle_unit, has_forces, reasons
+    shared.give_motion(context, solution, *given, is_whole=verbose)
 
 
 def _reasons(
@@ -83,6 +89,7 @@ def _reasons(
     module: ModuleType,
     times: NDArray[np.float64],
     options: dict[str, Any],
+    say: Callable[[kc.Solution], str],
 ) -> str:
     """Return why variants ended: the first ones, each solved alone."""
     failed = [k for k, found in enumerate(solution.good) if not found.all()]
@@ -90,7 +97,7 @@ def _reasons(
     for number in failed[:MOST_REASONS]:
         own = {name: float(values[number]) for name, values in solution.parameters.items()}
         alone = kc.solve(module, times, own, **options)
-        lines.append(f"{variant_named(solution, number)}: {alone.message}")
+        lines.append(f"{variant_named(solution, number)}: {say(alone)}")
     if len(failed) > MOST_REASONS:
         lines.append(f"{len(failed) - MOST_REASONS} more: solve one alone by --set to see why.")
     return "\n".join(lines)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sys
+import textwrap
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.results.solution import Solution
+    from kincompile.view.page import Page
 
     Ends = tuple[list[str], list[str]]
     """Names of the inputs and of the outputs of a transmission."""
@@ -152,8 +155,43 @@ _ANGLE = re.compile(r"(-?\d+(?:\.\d+)?(?:e[+-]?\d+)?) rad\b(?!/)")
 
 def end_unsolved(context: click.Context, message: str) -> NoReturn:
     """Say what was not solved, and end the command with the exit code of that."""
-    click.echo(f"Error: {message}", err=True)
+    click.echo(on_screen(f"Error: {message}"), err=True)
     context.exit(NOT_CONVERGED)
+
+
+def on_screen(text: str) -> str:
+    """Return a message as it is shown: wrapped between words on a terminal, else as it is."""
+    if not sys.stderr.isatty():
+        return text
+    width = shutil.get_terminal_size().columns
+    lines = (textwrap.fill(line, width, subsequent_indent="  ") for line in text.splitlines())
+    return "\n".join(lines)
+
+
+def warn_of_branch(doubt: str, angle_unit: str = "rad") -> None:
+    """Say that a motion does not begin where its model is drawn, if so."""
+    if doubt:
+        click.echo(on_screen(f"Warning: {shown_angles(doubt, angle_unit)}"), err=True)
+
+
+def reasons_of(
+    solution: Solution | Page,
+    angle_unit: str = "rad",
+    *,
+    is_whole: bool = False,
+    between: str = "\n  ",
+) -> str:
+    """Return why a motion failed: what, its limit and what to do, a line each.
+
+    `is_whole` adds the residuals. Where reasons are not known it is the message.
+    """
+    given = solution.reasons if is_whole else solution.reasons[:-1]
+    return shown_angles(between.join(filter(None, given)) or solution.message, angle_unit)
+
+
+verbose_option = click.option(
+    "-v", "--verbose", is_flag=True, help="Say of a failure which equations are missed too."
+)
 
 
 def give_motion(
@@ -164,11 +202,13 @@ def give_motion(
     angle_unit: str,
     has_forces: bool,
     reasons: str = "",
+    *,
+    is_whole: bool = False,
 ) -> None:
     """Print the summary of a motion, write it where a file is asked for, and exit by its success.
 
     With `has_forces` both have the forces along it. `reasons` say why not all of it was found; the
-    message of the solution does where none are given.
+    message of the solution does where none are given, `is_whole` with the residuals.
     """
     written = solution
     if has_forces:
@@ -179,8 +219,9 @@ def give_motion(
     else:
         kc.write(written, output, angle_unit=angle_unit)
         click.echo(f"{text}\nWrote {output}", err=True)
+    warn_of_branch(solution.doubt, angle_unit)
     if not solution.success:
-        end_unsolved(context, shown_angles(reasons or solution.message, angle_unit))
+        end_unsolved(context, reasons or reasons_of(solution, angle_unit, is_whole=is_whole))
 
 
 def shown_angles(message: str, angle_unit: str) -> str:

@@ -12,10 +12,14 @@ from kincompile.cli.motion import Motion, motion_options
 from kincompile.cli.shared import (
     NOT_CONVERGED,
     deg_option,
+    on_screen,
     output_option,
     read_model,
+    reasons_of,
     tabled_ends,
     transmission_option,
+    verbose_option,
+    warn_of_branch,
 )
 from kincompile.cli.watch import follow
 from kincompile.errors import InputError
@@ -36,6 +40,7 @@ if TYPE_CHECKING:
 @motion_options
 @transmission_option("A panel of the mechanism as a function, also by a table [transmission]")
 @deg_option("Show angles in degrees at first; the page can change it.")
+@verbose_option
 @click.pass_context
 def command(
     context: click.Context,
@@ -45,6 +50,7 @@ def command(
     motion: Motion,
     transmission: Ends | None,
     angle_unit: str,
+    verbose: bool,
 ) -> None:
     """Write a page that shows MODEL in motion, with plots and numbers.
 
@@ -82,8 +88,11 @@ def command(
     for path in written:
         click.echo(f"Wrote {path}", err=True)
     failed = [item for item in pages if not item.success]
+    for item in pages:
+        warn_of_branch(item.doubt, angle_unit)
     for item in failed:
-        click.echo(f"Error: {item.message}", err=True)
+        said = reasons_of(item, angle_unit, is_whole=verbose)
+        click.echo(on_screen(f"Error: {said}"), err=True)
     if failed:
         context.exit(NOT_CONVERGED)
 

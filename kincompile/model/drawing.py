@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from kincompile.errors import ModelError
 from kincompile.model.absolute import AbsoluteX, AbsoluteY
+from kincompile.model.arguments import Kind
 from kincompile.model.bodies import Body
 from kincompile.model.constraint import Constraint, Element
 from kincompile.model.equation import Equation
@@ -91,8 +92,9 @@ class Drawing(Generic[Made]):
 
         A place is (x, y), in space (x, y, z).
 
-        A joint that several links have is a pin, one of a single link a point to be watched, with
-        columns ``G.x`` and ``G.y`` in a solution. Where lengths are given, a rough place will do.
+        A joint that several links have is a pin. One of a single link that nothing else holds is a
+        free end, with columns ``G.x`` and ``G.y`` in a solution; `point` names any other for that.
+        Where lengths are given, a rough place will do.
         """
         for name, place in places.items():
             if name in self._drawn.joints:
@@ -204,12 +206,31 @@ class Drawing(Generic[Made]):
         return self._mechanism
 
     def _name_points(self) -> None:
-        """Name the points of links: the joints that one moving link has alone."""
+        """Name the free ends: joints that one moving link has alone, and no other link holds.
+
+        Where there is none, and nothing is asked for, it is the last joint of one link alone.
+        """
         named = {item.name for item in self._mechanism.outputs}
+        alone, held = {}, self._held()
         for joint in self._drawn.joints:
             holders = [link for link in self._drawn.links.values() if joint in link.places]
             if len(holders) == 1 and not holders[0].body.is_ground and joint not in named:
-                self._mechanism.point(joint, holders[0].body, holders[0].places[joint])
+                alone[joint] = holders[0].body, holders[0].places[joint]
+        free = [joint for joint, (body, place) in alone.items() if (body.name, place) not in held]
+        for joint in free or (list(alone)[-1:] if not named else ()):
+            self._mechanism.point(joint, *alone[joint])
+
+    def _held(self) -> list[tuple[str, Point]]:
+        """Return the points that constraints of two bodies hold, each with the name of its body."""
+        found = []
+        for item in self._mechanism.constraints:
+            if isinstance(item, Constraint) and len(item.frames()) > 1:
+                given = {x.symbol: getattr(item, key) for key, x in item.arguments().items()}
+                for x in item.arguments().values():
+                    body = given.get(x.on) if x.kind is Kind.POINT else None
+                    if body is not None:
+                        found.append((getattr(body, "name", body), given[x.symbol]))
+        return found
 
     def __repr__(self) -> str:
         """Return name and sizes."""

@@ -26,6 +26,7 @@ from kincompile.runtime.engine.scales import Point
 from kincompile.runtime.follow import Motion, follow
 from kincompile.runtime.march import March, all_hold
 from kincompile.runtime.problem import problem
+from kincompile.runtime.singular.sides import doubt
 from kincompile.runtime.start import start, turned_guesses
 from kincompile.runtime.status import Status
 
@@ -47,6 +48,7 @@ class Begin:
     equations: Problem
     q: Array  # (n,): assembled, or the guess
     is_assembled: bool  # whether other sets can follow from there
+    doubt: str = ""  # that it may not be the one that is meant
 
 
 def first_position(inputs: Inputs) -> tuple[Inputs, Begin]:
@@ -69,7 +71,8 @@ def first_position(inputs: Inputs) -> tuple[Inputs, Begin]:
         found = outcome.state
         if found is not None and found.sensitivity <= TOO_NEAR:
             begin = found.point.q
-            return replace(own, guess=begin), Begin(equations, begin, is_assembled=True)
+            said = doubt(equations, inputs.guess, outcome, time)
+            return replace(own, guess=begin), Begin(equations, begin, is_assembled=True, doubt=said)
     equations = problem(inputs.code, inputs.p, inputs.guess, time)
     return inputs, Begin(equations, inputs.guess, is_assembled=False)
 

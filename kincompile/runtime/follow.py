@@ -9,17 +9,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from kincompile.criteria import OTHER_SIZE, RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
-from kincompile.names import listed
 from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense, Sparse
 from kincompile.runtime.engine.scales import Point
 from kincompile.runtime.grid import solve_grid
 from kincompile.runtime.march import CORRECTIONS_ON_GRID, March, Outcome, State
-from kincompile.runtime.singular.events import (
-    DOUBTS,
-    ended,
-    involved,
-    singular_start,
-)
+from kincompile.runtime.singular.events import ended, singular_start
+from kincompile.runtime.singular.sides import doubt
 from kincompile.runtime.start import give_up, start
 from kincompile.runtime.status import Status
 
@@ -140,6 +135,8 @@ def follow(
     motion = Motion.over(inputs)
     continuation = _Continuation(inputs, motion, progress)
     outcome = continuation.start()
+    if explains and (outcome.left_branch or outcome.other):
+        motion.note = continuation.doubt(outcome)
     if inputs.method is None and continuation.march_compiled(outcome):
         return motion, outcome
     outcome = continuation.run(outcome)
@@ -171,22 +168,16 @@ class _Continuation:
             outcome = start(self._march, time, inputs)
         self._put(outcome)
         self._motion.is_folded = outcome.is_folded
-        if self._may_be_dense and (outcome.left_branch or outcome.other):
-            self._motion.note = self._doubt(outcome, time)
         if outcome.position is not None:
             # The guess may be rough: from here on the assembled mechanism gives the size.
             self._march = self._march_at(outcome.position.q, self._march.engine)
         return outcome
 
-    def _doubt(self, outcome: Outcome, time: float) -> str:
+    def doubt(self, outcome: Outcome) -> str:
         """Say that the position found from the guess may not be the one that is meant."""
-        said, bodies = [DOUBTS["strays"]] if outcome.left_branch else [], ""
-        if outcome.other is not None and outcome.position is not None:
-            away = outcome.other.q - outcome.position.q
-            said.append(DOUBTS["other"])
-            bodies = listed(involved(self._inputs.code, away / self._march.equations.reference))
-        t = f"{time:.10g}"
-        return "".join(f" {x.format(t=t, bodies=bodies)}{DOUBTS['remedy']}" for x in said)
+        if not self._may_be_dense:
+            return ""
+        return doubt(self._march.equations, self._inputs.guess, outcome, float(self._times[0]))
 
     def march_compiled(self, outcome: Outcome) -> bool:
         """Let a compiled module follow the motion from its start; say whether all went well.

@@ -72,6 +72,7 @@ NAMED_BODIES = 6
 """Of how many bodies a message gives the position."""
 
 CANNOT_BE = "No position was found: the mechanism cannot be assembled"
+CHANGE = "Change lengths, or what the drivers demand."
 
 WORDS = {
     "converged": "{name}: {points} converged; the largest residual is {residual}.",
@@ -348,9 +349,12 @@ def start_of_first(inputs: Inputs, solution: Solution) -> str:
 def solution_of(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
     """Put names, parameters and a verdict to the numbers, and warn of what was passed."""
     warn(inputs, motion, outcome, 5)
+    message, reasons = explained(inputs, motion, outcome)
     return Solution(
         success=outcome.status is Status.CONVERGED,
-        message=verdict(inputs, motion, outcome) + motion.note,
+        message=f"{message} {motion.note}".rstrip(),
+        doubt=motion.note,
+        reasons=reasons,
         t=inputs.t,
         **motion.fields(),
         **inputs.about(),
@@ -379,30 +383,36 @@ def _nearly(inputs: Inputs, near: list[int]) -> str:
 
 def verdict(inputs: Inputs, motion: Motion, outcome: Outcome) -> str:
     """Say in words how a motion went; the outcome is that of the last point that was tried."""
+    return explained(inputs, motion, outcome)[0]
+
+
+def explained(inputs: Inputs, motion: Motion, outcome: Outcome) -> tuple[str, tuple[str, ...]]:
+    """Say how a motion went; of one that failed also what, its limit, what to do, and details."""
     name, times, events = inputs.code.name, inputs.t, motion.events
     if outcome.status is Status.CONVERGED:
         points = f"all {times.size} points" if times.size > 1 else "the point"
         passed = "".join(f" Passed: {event.kind} at t = {event.t:.10g}." for event in events)
         largest = motion.residual.max()
-        return (
-            WORDS["converged"].format(name=name, points=points, residual=f"{largest:.2g}") + passed
-        )
+        said = WORDS["converged"].format(name=name, points=points, residual=f"{largest:.2g}")
+        return said + passed, ()
     index = int(np.argmax(motion.status != Status.CONVERGED))
-    asked = _asked(inputs, outcome)
-    why = motion.undriven or _why(outcome, events, times[index], asked)
-    parts = [
-        WORDS["failed"].format(
-            name=name,
-            t=f"{times[index]:.10g}",
-            point=index + 1,
-            count=times.size,
-            status=outcome.status.name,
-        ),
-        _before(outcome, index),
-        why,
-        _there(inputs, outcome),
-    ]
-    return " ".join(part for part in parts if part)
+    why, asked = _why(outcome, events, times[index], _asked(inputs, outcome))
+    failed = WORDS["failed"].format(
+        name=name,
+        t=f"{times[index]:.10g}",
+        point=index + 1,
+        count=times.size,
+        status=outcome.status.name,
+    )
+    before, there = _before(outcome, index), _there(inputs, outcome)
+    why = motion.undriven or why
+    what, _, remedy = why.partition(". ")
+    if why == CANNOT_BE:
+        why, remedy = f"{why} at this time:", CHANGE
+    when = "" if " at t = " in what else f" at t = {times[index]:.10g}"
+    details = " ".join(filter(None, (failed, before, there)))
+    reasons = f"{name}{when}: {what.rstrip('.')}.", asked, remedy, details
+    return " ".join(filter(None, (failed, before, why, asked, there))), reasons
 
 
 def _before(outcome: Outcome, index: int) -> str:
@@ -423,21 +433,22 @@ def _asked(inputs: Inputs, outcome: Outcome) -> str:
     return " ".join(impossible(equations, point.q, point.t))
 
 
-def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> str:
-    """Say why the motion ended, and what to do: by the event between its end and the failed time.
+def _why(outcome: Outcome, events: Sequence[Event], t: float, asked: str) -> tuple[str, str]:
+    """Say why the motion ended, and what to do, by the event between its end and the failed time.
 
-    Without one, what the status may mean is said in general, and the last event on the way.
+    Without one, what the status may mean is said in general, and the last event on the way. What is
+    `asked` for comes second, where it is known.
     """
     if outcome.status is Status.NOT_ASSEMBLED:
-        return f"{CANNOT_BE} at this time: {asked}" if asked else WORDS["not assembled"]
+        return (CANNOT_BE, asked) if asked else (WORDS["not assembled"], "")
     if outcome.exhausted:
-        return WORDS["exhausted"]
+        return WORDS["exhausted"], ""
     general = " ".join((outcome.status.sentence, *(event.message for event in events[-1:])))
     if events and outcome.state is not None:
         event, end = events[-1], outcome.state.t
         if abs(event.t - end) + abs(event.t - t) <= abs(t - end) + criteria.LATE:
             general = event.message
-    return f"{general} {asked}".rstrip()
+    return general, asked
 
 
 def _there(inputs: Inputs, outcome: Outcome) -> str:

@@ -75,7 +75,7 @@ def solve_variants(inputs: Inputs, sets: Array, progress: Progress | None) -> So
             progress(chunk.stop, count)
     if inputs.smooth:
         _warn_of(inputs, _go_through(inputs, sets, motions))
-    return _solution(inputs, motions)
+    return _solution(inputs, motions, begin.doubt)
 
 
 def _go_through(inputs: Inputs, sets: Array, motions: Motion) -> dict[int, Event]:
@@ -120,7 +120,7 @@ def solve_in_turn(inputs: Inputs, sets: Array, progress: Progress | None) -> Sol
         if progress:
             progress(variant + 1, len(sets))
     _warn_of(inputs, passed)
-    return _solution(inputs, motions)
+    return _solution(inputs, motions, begin.doubt)
 
 
 class _Chunk:
@@ -304,7 +304,7 @@ class _Chunk:
         return status is Status.CONVERGED
 
 
-def _solution(inputs: Inputs, motions: Motion) -> Solution:
+def _solution(inputs: Inputs, motions: Motion, doubt: str) -> Solution:
     name, count = inputs.code.name, motions.status.shape[1]
     statuses = motions.status.T
     failed = np.flatnonzero((statuses != Status.CONVERGED).any(axis=1))
@@ -320,5 +320,10 @@ def _solution(inputs: Inputs, motions: Motion) -> Solution:
             f"{variant} at t = {inputs.t[index]:.10g} ({status.name}). {why}"
         )
     return Solution(
-        success=failed.size == 0, message=message, t=inputs.t, **motions.fields(), **inputs.about()
+        success=failed.size == 0,
+        message=f"{message} {doubt}".rstrip(),
+        doubt=doubt,
+        t=inputs.t,
+        **motions.fields(),
+        **inputs.about(),
     )

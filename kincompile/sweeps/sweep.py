@@ -10,13 +10,14 @@ chunks     -> executor    those that are missing, a few at a time             ch
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile.compiler import compile as compiled
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
-from kincompile.errors import InputError, SweepError
+from kincompile.errors import AssemblyWarning, InputError, SweepError
 from kincompile.model.mechanism import system_of
 from kincompile.names import escaped
 from kincompile.runtime.engine.code import FORCES, code_of
@@ -113,6 +114,11 @@ def sweep(
     Sweep
         ``.to_xarray()`` has the results; a status of each point says what could not be solved.
 
+    Warns
+    -----
+    AssemblyWarning
+        When the first set is on another branch than its guess or the drawing shows.
+
     Raises
     ------
     InputError
@@ -132,6 +138,8 @@ def sweep(
     plan, inputs = _planned(module, p, t, guess, product, chunk, through)
     first = dict(zip(module.PARAMETERS, plan.sets(0)[0].tolist(), strict=True))
     begin = solve(module, inputs.t[:1], first, guess, assembly=assembly)
+    if begin.doubt:
+        warnings.warn(begin.doubt, AssemblyWarning, stacklevel=2)
     # All chunks start from one position, so that one assembly is meant in all.
     position = begin.q[0] if begin.success else inputs.guess
     layout = _layout(begin, columns, measures)

@@ -81,6 +81,16 @@ class Page:
         """The message of the solver or of the compiler."""
         return str(self.data["message"])
 
+    @property
+    def doubt(self) -> str:
+        """What the solver says of a start on another branch than is drawn; "" without a doubt."""
+        return str(self.data["doubt"])
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the motion failed, as in a solution."""
+        return tuple(self.data["reasons"])
+
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write the page to a file, in one step, and return its path.
 

@@ -71,6 +71,8 @@ def page_data(
         "name": system.name,
         "message": message,
         "success": solution is not None and solution.success,
+        "doubt": "" if solution is None else solution.doubt,
+        "reasons": [] if solution is None else list(solution.reasons),
         "lengthUnit": system.length_unit,
         "coordinates": [{"name": item.name, "unit": item.unit} for item in system.coordinates],
         "outputs": outputs,

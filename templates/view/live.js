@@ -63,8 +63,8 @@ function listed(bodies) {
 /* A warning about a start on another branch than the guess may mean. */
 function doubtOf({ t, other, strays }) {
   const { words } = player.data, said = [strays && words.strays, other && words.other].filter(Boolean);
-  const values = { t: brieflyNumber(t[0]), bodies: other && listed(other) };
-  return said.map(text => filled(text, values) + words.remedy).join(' ');
+  const values = { t: brieflyNumber(t[0]), bodies: other && listed(other), sides: '' };
+  return said.length ? said.map(text => filled(text, values)).join('. ') + words.remedy : '';
 }
 
 /* The event that ended a motion, with its sentence. */

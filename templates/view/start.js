@@ -27,8 +27,8 @@ function inShort({ kind, t, bodies }) {
 function showVerdict() {
   const { data } = player;
   // While sliders are pulled, the verdict is below them: nothing above them must move.
-  byId('message').hidden = data.success || live.isChanged;
-  byId('message').textContent = data.message;
+  byId('message').hidden = (data.success && !data.doubt) || live.isChanged;
+  byId('message').textContent = data.success ? data.doubt : data.message;
   byId('events').replaceChildren();
   for (const event of data.events) {
     const item = document.createElement('li'), button = document.createElement('button');

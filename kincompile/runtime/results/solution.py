@@ -96,6 +96,12 @@ class Solution(MotionTable):
         Those of variants are found by solving a variant alone.
     module : module or None
         The emitted module; None in a copy from another process.
+    doubt : str
+        That the first position is on another branch than the guess or the drawing shows, or that
+        another one is as near to it; "" without a doubt.
+    reasons : tuple of str
+        Of a motion that failed what happened, which limit it met, what to do, and the residuals;
+        "" where that is not known.
     """
 
     iterations: NDArray[np.int64]
@@ -104,6 +110,8 @@ class Solution(MotionTable):
     statistics: dict[str, int]
     module: ModuleType | None
     _observed: dict[str, Observed] = field(default_factory=dict)
+    doubt: str = ""
+    reasons: tuple[str, ...] = ()
 
     @property
     def observed(self) -> Observed:

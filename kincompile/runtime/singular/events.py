@@ -58,9 +58,9 @@ SENTENCES = {
 """The message of an event, by its kind."""
 
 DOUBTS = {
-    "strays": "The position at t = {t} is on another branch than the guess: ",
-    "other": "Another position at t = {t}, with {bodies} elsewhere, is as near to the guess: ",
-    "remedy": "kc.assemblies gives all of them, and each serves as a guess.",
+    "strays": "The position at t = {t} is on another branch than the guess{sides}",
+    "other": "Another position at t = {t}, with {bodies} elsewhere, is as near to the guess",
+    "remedy": ": kc.assemblies gives all of them; assembly=N, or --assembly N, starts in one.",
 }
 """Warnings about a start on another branch than the guess may mean."""
 

@@ -64,14 +64,14 @@ def test_that_what_was_found_is_drawn(kincompile, tmp_path):
     model, picture = tmp_path / "stops.py", tmp_path / "a.svg"
     model.write_text(STOPS, encoding="utf-8")
     done = kincompile("draw", model, "-o", picture)
-    assert (done.exit_code, "Error: stops failed at t = " in done.stderr) == (3, True)
+    assert (done.exit_code, "Error: stops: Lock-up at t = 1" in done.stderr) == (3, True)
     assert "in motion from t = 0 to 0.9 s" in described(picture)[0]
     assert kincompile("draw", model, "-o", picture, "--time", "0.5").exit_code == 3
     assert "at t = 0.5 s" in described(picture)[0]
     picture.unlink()
     done = kincompile("draw", model, "-o", picture, "--time", "1.5")
     assert (done.exit_code, picture.exists()) == (3, False)
-    assert "Error: stops failed at t = " in done.stderr
+    assert "Error: stops: Lock-up at t = " in done.stderr
 
 
 @pytest.mark.parametrize(

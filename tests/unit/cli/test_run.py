@@ -81,7 +81,7 @@ def test_that_a_failed_run_writes_what_was_found_and_says_where_it_ended(
 ):
     done = kincompile("run", stopping, "-o", tmp_path / "out.csv")
     assert (done.exit_code, done.stdout) == (3, "")
-    assert "Error: stops failed at t = 1.2, point 4 of 6" in done.stderr
+    assert "Error: stops: Lock-up at t = 1: " in done.stderr
     assert "3 CONVERGED" in done.stderr
     assert "2 NOT_REACHED" in done.stderr
     rows = rows_of(tmp_path / "out.csv")
@@ -94,7 +94,7 @@ def test_that_the_summary_of_a_failed_run_is_still_data(kincompile, stopping):
     done = kincompile("run", stopping)
     assert done.exit_code == 3
     assert "3 CONVERGED" in done.stdout
-    assert done.stderr.startswith("Error: stops failed at t = 1.2")
+    assert done.stderr.startswith("Error: stops: Lock-up at t = 1: ")
 
 
 def test_that_a_run_without_any_position_has_a_summary(kincompile, tmp_path):
@@ -256,3 +256,50 @@ def test_that_a_name_with_another_ending_is_no_name_of_a_page(kincompile, tmp_pa
         "folder\n",
     )
     assert [item.name for item in tmp_path.iterdir()] == ["bars.toml"]
+
+
+def test_that_a_failure_is_said_in_three_lines_and_its_residuals_on_request(kincompile, tmp_path):
+    path = tmp_path / "bars.toml"
+    path.write_text(BARS)
+    said = kincompile("run", path, "--set", "r=1.8", "--deg").stderr
+    what, limit, remedy = said.splitlines()
+    assert what.startswith("Error: bars: Lock-up at t = ")
+    assert re.fullmatch(
+        r"  drive_crank is .* deg; it can be -139.9 deg at least, 139.9 deg at most .*", limit
+    )
+    assert remedy.startswith("  End the motion before this time")
+    whole = kincompile("run", path, "--set", "r=1.8", "--deg", "-v").stderr
+    assert whole.startswith(said.rstrip())
+    assert "The equations with the largest residuals" in whole
+    assert " rad" not in whole
+
+
+FOUR_BAR = """
+import kincompile as kc
+s = kc.Sketch("four_bar", length_unit="mm", end=1.0, points=7)
+s.ground(O=(0, 0), C=(100, 0))
+s.joints(A=(44, 42), B=({B}))
+s.link("crank", "O A", s.length("r", 50))
+s.link("coupler", "A B", s.length("a", 125))
+s.link("rocker", "C B", s.length("b", 125))
+s.drive("crank", 2 * kc.pi * kc.t)
+m = s.mechanism()
+"""
+
+
+@pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize(
+    "command", [("run",), ("run", "--sweep", "a=120:130:3"), ("view", "-o"), ("draw", "-o"),
+                ("sweep", "--processes", "1", "--target", "numpy", "--sweep", "a=120:130:3")],
+)  # fmt: skip
+def test_that_a_start_on_another_branch_than_drawn_is_said_once(kincompile, tmp_path, command):
+    """B is drawn left of the line from A to C; at t = 0 Newton's method ends right of it."""
+    path = tmp_path / "four_bar.py"
+    for place, count in (("174, -31", 1), ("120, 120", 0)):
+        path.write_text(FOUR_BAR.replace("{B}", place))
+        name, *options = command
+        output = [tmp_path / ("a.html" if name == "view" else "a.svg")] * ("-o" in options)
+        done = kincompile(name, path, *options, *output)
+        said = "(B is drawn left of the line A C, and found right of it)"
+        assert (done.exit_code, done.stderr.count(said)) == (0, count)
+        assert done.stderr.count("Warning: The position at t = 0 is on another branch") == count

@@ -40,7 +40,7 @@ def test_that_several_models_go_into_a_folder_with_an_index(
         "index.html", "pendulum.html", "stops.html",
     ]  # fmt: skip
     assert done.exit_code == 3  # the second stops
-    assert "Error: stops failed at t = " in done.stderr
+    assert "Error: stops: Lock-up at t = " in done.stderr
 
 
 def test_that_a_motion_that_stops_is_shown_as_far_as_it_goes(kincompile, stopping, tmp_path):

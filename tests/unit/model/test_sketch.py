@@ -289,3 +289,30 @@ def test_that_the_precision_of_mpmath_changes_no_text(example_named):
     with mpmath.workdps(60):
         model = kc.read(example.path.with_suffix(".toml"))
     assert kc.emit(model).source == example.source
+
+
+def excavator():
+    """Return a boom and a stick, each moved by a cylinder, with the eyes of both."""
+    s = kc.Sketch("excavator", end=1.0, points=3)
+    s.ground(O=(0, 1.8), Q=(0.6, 1.2))
+    s.joints(R=(1.6, 3.0), S=(1.9, 3.6), T=(4.5, 3.2), U=(4.0, 4.0), Tip=(5.4, 0.1))
+    s.link("boom", "O R S T")
+    s.link("stick", "U T Tip")
+    for ends, first, second in (("Q R", (0.6, 1.2), (1.6, 3.0)), ("S U", (1.9, 3.6), (4.0, 4.0))):
+        s.drive(ends, math.dist(first, second) + 0.1 * kc.t)
+    return s
+
+
+def test_that_free_ends_and_what_is_named_are_columns():
+    """The eyes of cylinders crowd no table; without a free end the last of them is a column."""
+    s = excavator()
+    assert [point.name for point in s.mechanism().outputs] == ["Tip"]
+    s = excavator()
+    s.point("S")
+    assert [point.name for point in s.mechanism().outputs] == ["S", "Tip"]
+    s = kc.Sketch("boom", end=1.0, points=3)
+    s.ground(O=(0, 0), Q=(1, 0))
+    s.joints(R=(1, 1))
+    s.link("boom", "O R")
+    s.drive("Q R", 1 + kc.t / 2)
+    assert [point.name for point in s.mechanism().outputs] == ["R"]
