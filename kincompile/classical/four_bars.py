@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from kincompile.runtime.results.solution import Solution
-
     Array = NDArray[np.float64]
     Complex = NDArray[np.complex128]
     Place = tuple[float, float]
@@ -53,8 +51,8 @@ class Passage:
         Whether coupler and rocker are folded to one side in all poses, which one driven link can
         do; whether the linkage can get from each pose to the others without being taken apart.
     deviation : float
-        How far B is from its place in the poses, at most, where the motion is solved [length]; nan
-        where it ends before.
+        How far B is from its places in the poses, at most, when the motion is solved [length]; nan
+        where it ends before, or is not tried, as the poses are out of order or on two branches.
     works : bool
         Whether the motion goes through all poses, in order.
     message : str
@@ -99,6 +97,8 @@ class FourBar:
         """Refuse what is no linkage."""
         if read(_joints(self), "the joints").shape != (5, 2):
             raise InputError("The joints have another shape than (5, 2). Give (x, y) of each.")
+        if min(self.lengths) == 0:
+            raise InputError("Two joints of a link are in one place. Give it a length.")
         if self.driven not in LEFT:
             raise InputError(f"driven is {self.driven!r}. Give one of: {listed(LEFT)}.")
 
@@ -235,24 +235,35 @@ def _tried(
     turn = way * (float(turns.max()) or math.tau)
     times = turns / abs(turn)
     made = _made((O, A[0], B[0], C, P), "crank", turn)
-    solution = _motion(made, np.unique([*np.linspace(0, 1, SAMPLES), *times]))
-    deviation = math.nan
-    if solution.success:
-        at = np.searchsorted(solution.t, times)
-        deviation = float(np.abs(solution["B.x"][at] + 1j * solution["B.y"][at] - B).max())
     folded = np.sign((np.conj(B - A) * (C - B)).imag)
     circuit = _circuit(made.lengths, folded, np.sign((np.conj(A - O) * (C - O)).imag))
     in_order = bool(np.all(np.diff(times) > SLIGHT))
     checks = in_order, bool((folded == folded[0]).all()), bool((circuit == circuit[0]).all())
-    works = all(checks) and deviation < SLIGHT * size
-    message = _message(times, folded, circuit, turn, solution, works)
+    deviation, message = math.nan, _defects(times, folded, circuit)
+    if not message:
+        deviation, message = _motion(made, times, B, size)
+    works = deviation < SLIGHT * size
     return replace(made, passage=Passage(times, *checks, deviation, works, message))
 
 
-def _motion(made: FourBar, times: Array) -> Solution:
+def _motion(made: FourBar, times: Array, places: Complex, size: float) -> tuple[float, str]:
+    """Return how far B is from its places (K,) at times, by the solver, and what to say of it."""
+    grid = np.unique([*np.linspace(0, 1, SAMPLES), *times])
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # where the motion ends, the message of the passage says it
-        return solve(compiled(made.sketch().mechanism()), times)
+        warnings.simplefilter("ignore")  # the message has it
+        solution = solve(compiled(made.sketch().mechanism()), grid)
+    if not solution.success:
+        return math.nan, f"The crank cannot turn so: {solution.message.partition('. ')[0]}."
+    angles = solution["rocker.phi"][np.searchsorted(grid, times)]
+    found = _complex(made.C) + made.lengths[3] * np.exp(1j * angles)
+    off = float(np.abs(found - places).max())
+    if off > SLIGHT * size:
+        return (
+            off,
+            f"The motion is off the poses by up to {off:.3g}: it passes a singular position.",
+        )
+    turn = math.degrees(made.turn)
+    return off, f"The crank turns by {turn:.4g} deg through the poses in their order."
 
 
 def _circuit(lengths: Sequence[float], at_b: Array, at_o: Array) -> Array:
@@ -266,12 +277,8 @@ def _circuit(lengths: Sequence[float], at_b: Array, at_o: Array) -> Array:
     return at_b if lengths.index(order[0]) < 2 else at_o
 
 
-def _message(
-    times: Array, folded: Array, circuit: Array, turn: float, solution: Solution, works: bool
-) -> str:
-    """Say whether and how the linkage goes through the poses."""
-    if works:
-        return f"The crank turns by {math.degrees(turn):.4g} deg through the poses in their order."
+def _defects(times: Array, folded: Array, circuit: Array) -> str:
+    """Say what is in the way of a motion through the poses, "" where nothing is."""
     words = []
     if (np.diff(times) <= SLIGHT).any():
         order = listed(np.argsort(times, kind="stable") + 1)
@@ -282,8 +289,6 @@ def _message(
     elif (folded != folded[0]).any():
         others = listed(np.flatnonzero(folded != folded[0]) + 1)
         words.append(f"Poses on another branch than the first: {others}; drive another link.")
-    if not solution.success:
-        words.append(f"{solution.message.partition('. ')[0]}.")
     return " ".join(words)
 
 

@@ -147,7 +147,7 @@ def freudenstein(inputs: ArrayLike, outputs: ArrayLike, *, ground: float = 1.0) 
             f"Inputs and outputs have the shapes {theta.shape} and {phi.shape}. Give three to five "
             "of both."
         )
-    found = []
+    found, ground = [], float(read(ground, "ground"))
     for k1, k2, z in _constants(theta, phi):
         # Of angles theta + theta_0 and phi + phi_0: k1 = K1 e^(i phi_0), k2 = K2 e^(i theta_0).
         phi_0 = k1 / abs(k1)
@@ -176,7 +176,10 @@ def _constants(theta: Array, phi: Array) -> list[Complex]:
     ))[:, : {3: 4, 4: 6, 5: 7}[count]]  # fmt: skip
     _, sizes, right = np.linalg.svd(rows)
     if sizes[-1] < SLIGHT**2 * sizes[0]:
-        raise InputError("Precision points repeat each other. Give pairs that differ.")
+        raise InputError(
+            "Some precision points follow from the others, as where two are equal or outputs are "
+            "the inputs. Give others."
+        )
     free = np.zeros((7, len(right) - count))
     free[: len(right)] = right[count:].T
     if count == 3:

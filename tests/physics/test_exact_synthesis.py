@@ -170,7 +170,12 @@ FIVE = poses_at(AROUND).tolist()
         (lambda s: s.dyads(FIVE[:3], circle=(0, 0, 0)), r"circle has the shape \(1, 3\)"),
         (lambda s: s.dyads(FIVE[:4], turn=[1, math.tau]), "A turn of the link is zero"),
         (lambda s: s.freudenstein([0, 1], [0, 1]), "Give three to five of both"),
-        (lambda s: s.freudenstein([0, 1, 1], [0, 1, 1]), "Precision points repeat each other"),
+        (
+            lambda s: s.freudenstein([0, 1, 1], [0, 1, 1]),
+            "Some precision points follow from the others",
+        ),
+        (lambda s: s.freudenstein([0, 1, 2], [0, 1, 2]), "where two are equal or outputs are"),
+        (lambda s: s.FourBar((0, 0), (1, 0), (1, 0), (0, 1), (2, 2)), "are in one place. Give it"),
         (lambda s: s.path(FIVE, AROUND), "Give five of both"),
         (lambda s: s.chebyshev_spacing(0, 1, 0), "count is 0. Give how many precision points"),
         (lambda s: s.four_bar(*s.dyads(FIVE)[:2], FIVE[0]), r"have the shape \(3,\)"),
@@ -234,7 +239,7 @@ def test_that_poses_out_of_order_are_told_by_the_crank():
     poses = poses_at(np.radians([0.0, 90, 45, 120]))
     passage = kc.synthesis.four_bar(*dyads_of((CRANK, COUPLER, ROCKER, GROUND)), poses).passage
     assert (passage.in_order, passage.one_branch, passage.works) == (False, True, False)
-    assert passage.deviation < 1e-9
+    assert math.isnan(passage.deviation)
     assert passage.message == "The order in which the crank meets the poses is 1, 3, 2, 4."
 
 
@@ -244,6 +249,52 @@ def test_that_poses_on_two_circuits_are_told():
     passage = kc.synthesis.four_bar(*dyads_of(sizes), poses).passage
     assert (passage.one_branch, passage.one_circuit, passage.works) == (False, False, False)
     assert "Poses on another circuit than the first: 3; take another pair." in passage.message
+
+
+def by_coupler(direction, side, sizes):
+    """Return A and B at directions of the coupler."""
+    crank, coupler, rocker, ground = sizes
+    A = meet(0, crank, ground - coupler * direction, rocker, side)
+    return A, A + coupler * direction
+
+
+def by_rocker(direction, side, sizes):
+    """Return A and B at directions of the rocker."""
+    crank, coupler, rocker, ground = sizes
+    B = ground + rocker * direction
+    return meet(np.zeros_like(B), crank, B, coupler, side), B
+
+
+def by_crank(direction, side, sizes):
+    """Return A and B at directions of the crank."""
+    return places(np.angle(direction), side, sizes)[:2]
+
+
+@pytest.mark.parametrize(
+    ("least", "at", "sizes"),
+    [
+        ("crank", by_crank, (CRANK, COUPLER, ROCKER, GROUND)),
+        ("coupler", by_coupler, (5.0, 2.0, 5.0, 4.0)),
+        ("rocker", by_rocker, (ROCKER, COUPLER, CRANK, GROUND)),
+        ("ground", by_crank, (3.0, 2.8, 3.2, 1.0)),
+    ],
+)
+def test_that_a_turn_of_the_least_link_is_a_circuit(least, at, sizes):
+    """By Grashof: the mirrored positions of the others are another."""
+    assert sizes.index(min(sizes)) == ["crank", "coupler", "rocker", "ground"].index(least)
+    direction = np.exp(1j * np.array([0.3, 1.4, 2.5, 3.6, 4.7, 5.8]))
+    first, second = (np.array(at(direction, side, sizes)) for side in (1, -1))
+    mixed = np.where(np.arange(6) < 4, first, second)
+    passages = []
+    for A, B in (first, second, mixed):
+        angles = np.angle((B - A) / sizes[1])
+        P = A + np.exp(1j * angles) * POINT
+        poses = np.column_stack((P.real, P.imag, angles))
+        passages.append(kc.synthesis.four_bar(*dyads_of(sizes), poses).passage)
+    assert [item.one_circuit for item in passages] == [True, True, False]
+    folds = least in {"coupler", "rocker"}  # whose turn folds coupler and rocker
+    assert [item.one_branch for item in passages] == [not folds, not folds, False]
+    assert "circuit than the first: 5, 6;" in passages[2].message
 
 
 def test_that_a_linkage_that_is_not_grashofs_has_two_branches_on_one_circuit():
