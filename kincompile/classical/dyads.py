@@ -134,11 +134,8 @@ def dyads(
             w, m = _four(p, r, b)
         elif circle is not None:
             w = _places(circle, "circle") * angle / size
-            m = (
-                ((b - r) * w - p) / (b - 1)
-                if len(p) == 1
-                else _centre([w, *(p + r * w[:, None]).T])
-            )
+            ends = (p + r * w[:, None]).T
+            m = ((b - r) * w - p) / (b - 1) if len(p) == 1 else _centre([w, *ends])
         else:
             m = (_places(centre, "centre") - origin) / size
             back = ((m[:, None] - p) / r).T
@@ -243,15 +240,18 @@ def _meet(first: Array, second: Array) -> list[tuple[float, float]]:
 
 def _polished(p: Complex, r: Complex, w: complex, m: complex) -> Complex | None:
     """Return the pivots after Newton's method on the lengths of the link; None at no dyad."""
+
+    def off(x: Array) -> Array:
+        w, m = complex(x[0], x[1]), complex(x[2], x[3])
+        return np.asarray(np.abs(p + r * w - m) ** 2 - abs(w - m) ** 2)
+
+    x = np.array([w.real, w.imag, m.real, m.imag])
     for _ in range(CORRECTIONS):
-        ends = p + r * w - m
-        off = np.abs(ends) ** 2 - abs(w - m) ** 2
-        by_w, by_m = np.conj(ends) * r - np.conj(w - m), np.conj(w - m) - np.conj(ends)
-        by = 2 * np.column_stack((by_w.real, -by_w.imag, by_m.real, -by_m.imag))
-        step = np.linalg.lstsq(by, -off)[0]
-        w, m = w + complex(step[0], step[1]), m + complex(step[2], step[3])
-    off = np.abs(p + r * w - m) ** 2 - abs(w - m) ** 2
-    return np.array([w, m]) if np.abs(off).max() < STILL * (1 + abs(w) + abs(m)) ** 2 else None
+        # What is quadratic has its differences over any step as derivatives.
+        by = np.column_stack([off(x + step) - off(x - step) for step in np.eye(4)]) / 2
+        x = x - np.linalg.lstsq(by, off(x))[0]
+    is_dyad = np.abs(off(x)).max() < STILL * (1 + np.linalg.norm(x)) ** 2
+    return np.array([complex(x[0], x[1]), complex(x[2], x[3])]) if is_dyad else None
 
 
 def _four(p: Complex, r: Complex, b: Complex) -> tuple[Complex, Complex]:

@@ -95,7 +95,7 @@ class FourBar:
 
     def __post_init__(self) -> None:
         """Refuse what is no linkage."""
-        if read(_joints(self), "the joints").shape != (5, 2):
+        if read([self.O, self.A, self.B, self.C, self.P], "the joints").shape != (5, 2):
             raise InputError("The joints have another shape than (5, 2). Give (x, y) of each.")
         if min(self.lengths) == 0:
             raise InputError("Two joints of a link are in one place. Give it a length.")
@@ -103,27 +103,32 @@ class FourBar:
             raise InputError(f"driven is {self.driven!r}. Give one of: {listed(LEFT)}.")
 
     @property
+    def places(self) -> Complex:
+        """O, A, B, C and P as complex numbers."""
+        return np.array([self.O, self.A, self.B, self.C, self.P]) @ (1, 1j)
+
+    @property
     def lengths(self) -> tuple[float, float, float, float]:
         """Lengths of ground, crank, coupler and rocker."""
-        ends = (self.O, self.C), (self.O, self.A), (self.A, self.B), (self.C, self.B)
-        ground, crank, coupler, rocker = (math.dist(*pair) for pair in ends)
-        return ground, crank, coupler, rocker
+        ground, crank, coupler, rocker = np.abs(
+            self.places[[3, 1, 2, 2]] - self.places[[0, 0, 1, 3]]
+        )
+        return float(ground), float(crank), float(coupler), float(rocker)
 
     def sketch(self, name: str = "four_bar", *, length_unit: str = "m") -> Sketch:
         """Return its drawing, driven from time 0 to 1, with lengths as parameters."""
         s = Sketch(name, length_unit=length_unit, end=1.0, points=SAMPLES)
         s.ground(O=self.O, C=self.C)
         s.joints(A=self.A, B=self.B, P=self.P)
-        _, crank, coupler, rocker = self.lengths
-        along = _complex(self.B) - _complex(self.A)
-        place = (_complex(self.P) - _complex(self.A)) * along.conjugate() / abs(along)
+        O, A, B, C, P = self.places.tolist()  # noqa: N806, E741
+        links = {"crank": A - O, "coupler": B - A, "rocker": B - C}
+        crank, coupler, rocker = map(abs, links.values())
+        place = (P - A) * (B - A).conjugate() / coupler
         s.link("crank", "O A", s.length("OA", crank))
         point = (s.length("P_xi", place.real), s.length("P_eta", place.imag))
         s.link("coupler", "A B P", AB=s.length("AB", coupler), P=point)
         s.link("rocker", "C B", s.length("CB", rocker))
-        ends = {"crank": (self.O, self.A), "coupler": (self.A, self.B), "rocker": (self.C, self.B)}
-        first, second = (_complex(end) for end in ends[self.driven])
-        s.drive(self.driven, cmath.phase(second - first) + self.turn * t)
+        s.drive(self.driven, cmath.phase(links[self.driven]) + self.turn * t)
         return s
 
 
@@ -151,8 +156,8 @@ def four_bar(first: Dyad, second: Dyad, poses: ArrayLike) -> FourBar:
     if given.ndim != 2 or given.shape[1] != 3 or len(given) < 2:
         raise InputError(f"The poses have the shape {given.shape}. Give some of (x, y, angle).")
     P, R = given[:, 0] + 1j * given[:, 1], np.exp(1j * given[:, 2])  # noqa: N806
-    O, C = _complex(first.centre), _complex(second.centre)  # noqa: N806, E741
-    A, B = (P + R * _complex(item.circle) for item in (first, second))  # noqa: N806
+    O, C = complex(*first.centre), complex(*second.centre)  # noqa: N806, E741
+    A, B = (P + R * complex(*item.circle) for item in (first, second))  # noqa: N806
     size = float(max(np.abs(A - B)[0], abs(O - C), first.length, second.length))
     for base, ends, dyad in ((O, A, first), (C, B, second)):
         off = float(np.max(np.abs(np.abs(ends - base) - dyad.length)))
@@ -214,7 +219,7 @@ def cognates(linkage: FourBar) -> tuple[FourBar, FourBar]:
     -----
     S. Roberts, 1875; P. L. Chebyshev, 1878.
     """
-    O, A, B, C, P = (_complex(item) for item in _joints(linkage))  # noqa: N806, E741
+    O, A, B, C, P = linkage.places.tolist()  # noqa: N806, E741
     if min(abs(P - A), abs(P - B)) < SLIGHT * abs(B - A):
         raise InputError("P is in A or B, so that its path is an arc. Take another point.")
     ratio = (P - A) / (B - A)
@@ -255,15 +260,11 @@ def _motion(made: FourBar, times: Array, places: Complex, size: float) -> tuple[
     if not solution.success:
         return math.nan, f"The crank cannot turn so: {solution.message.partition('. ')[0]}."
     angles = solution["rocker.phi"][np.searchsorted(grid, times)]
-    found = _complex(made.C) + made.lengths[3] * np.exp(1j * angles)
-    off = float(np.abs(found - places).max())
-    if off > SLIGHT * size:
-        return (
-            off,
-            f"The motion is off the poses by up to {off:.3g}: it passes a singular position.",
-        )
-    turn = math.degrees(made.turn)
-    return off, f"The crank turns by {turn:.4g} deg through the poses in their order."
+    found = made.places[3] + made.lengths[3] * np.exp(1j * angles)
+    off, turn = float(np.abs(found - places).max()), math.degrees(made.turn)
+    if off < SLIGHT * size:
+        return off, f"The crank turns by {turn:.4g} deg through the poses in their order."
+    return off, f"The motion leaves its branch: it is off the poses by up to {off:.3g}."
 
 
 def _circuit(lengths: Sequence[float], at_b: Array, at_o: Array) -> Array:
@@ -308,11 +309,3 @@ def _merit(made: FourBar) -> tuple[bool, bool, bool, float]:
 def _made(joints: Sequence[complex], driven: str, turn: float) -> FourBar:
     O, A, B, C, P = ((float(item.real), float(item.imag)) for item in joints)  # noqa: N806, E741
     return FourBar(O, A, B, C, P, driven, turn)
-
-
-def _joints(made: FourBar) -> tuple[Place, Place, Place, Place, Place]:
-    return made.O, made.A, made.B, made.C, made.P
-
-
-def _complex(place: Place) -> complex:
-    return complex(place[0], place[1])

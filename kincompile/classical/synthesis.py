@@ -10,6 +10,8 @@ kc.synthesis.cognates(four_bar)                 the two others with the same cou
 
 from __future__ import annotations
 
+import math
+from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,18 +36,13 @@ if TYPE_CHECKING:
     Complex = NDArray[np.complex128]
 
 __all__ = [
-    "Dyad",
-    "Found",
-    "FourBar",
-    "Passage",
-    "chebyshev_spacing",
-    "cognates",
-    "dyads",
-    "four_bar",
-    "four_bars",
-    "freudenstein",
-    "path",
+    "Dyad", "Found", "FourBar", "Passage", "chebyshev_spacing", "cognates", "dyads", "four_bar",
+    "four_bars", "freudenstein", "path",
 ]  # fmt: skip
+
+
+SAME = 1e-3
+"""Part of the length of a link up to which two pivots are one that was found twice."""
 
 
 def chebyshev_spacing(start: float, end: float, count: int) -> Array:
@@ -92,22 +89,14 @@ def path(points: ArrayLike, angles: ArrayLike) -> Found[FourBar]:
     for crank in cranks:
         arm = complex(*crank.circle)
         A = complex(*crank.centre) - arm * np.exp(1j * turns)  # noqa: N806
-        if abs(arm) < SLIGHT * np.ptp(np.abs(P)):
+        if abs(arm) < SLIGHT * crank.length:
             continue
-        coupler = np.angle(P - A)
-        poses = np.column_stack((given, coupler))
-        circle = (-crank.length, 0.0)
-        first = Dyad(
-            crank.centre, circle, abs(arm), float(np.angle(np.exp(1j * (turns[1] - turns[0]))))
-        )
-        rockers = dyads(poses)
-        reasons.append(rockers.reason)
-        others = [
-            item
-            for item in rockers
-            if np.hypot(*np.subtract(item.circle, circle)) > SLIGHT * crank.length
-        ]
-        found += [four_bar(first, item, poses) for item in others]
+        poses = np.column_stack((given, np.angle(P - A)))
+        own = Dyad(crank.centre, (-crank.length, 0.0), abs(arm), 0.0)
+        both = dyads(poses)  # among them the crank itself
+        reasons.append(both.reason)
+        away = [math.dist(item.circle, own.circle) > SAME * crank.length for item in both]
+        found += [four_bar(own, item, poses) for item in compress(both, away)]
     return by_merit(found, next((item for item in reasons if item), ""))
 
 
