@@ -14,6 +14,7 @@ from kincompile.cli.motion import Motion, motion_options, sweep_options
 from kincompile.cli.progress import progress_bar
 from kincompile.errors import InputError
 from kincompile.names import listed
+from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.write import require_known_suffix, summary, variant_named
 
 if TYPE_CHECKING:
@@ -27,6 +28,9 @@ MOST_REASONS = 3
 """Variants of a sweep that are solved alone, to say why they ended."""
 
 
+_PART = "the path of a point is, from one time to another."
+
+
 @click.command("run")
 @click.argument("model")
 @motion_options
@@ -34,6 +38,19 @@ MOST_REASONS = 3
 @click.option("--analysis", metavar="FILE", help="Take end and points from an .acf file.")
 @shared.deg_option("Show and write angles in degrees.")
 @click.option("--forces", "has_forces", is_flag=True, help="Reactions and drivers' torques too.")
+@click.option(
+    "--straight", "lines", metavar="P[=FROM:TO]", multiple=True, help=f"How straight {_PART}"
+)
+@click.option(
+    "--circle", "circles", metavar="P[=FROM:TO]", multiple=True, help=f"How round {_PART}"
+)
+@click.option(
+    "--dwell",
+    "dwells",
+    metavar="NAME=TOL",
+    multiple=True,
+    help="How long a column stays within TOL of its greatest and its least value.",
+)
 @shared.output_option("Write the motion: .csv, .npz or .json.", required=False)
 @shared.verbose_option
 @click.pass_context
@@ -47,6 +64,9 @@ def command(
     angle_unit: str,
     has_forces: bool,
     output: str | None,
+    lines: tuple[str, ...],
+    circles: tuple[str, ...],
+    dwells: tuple[str, ...],
     verbose: bool,
 ) -> None:
     """Solve the motion of MODEL over time and summarise it.
@@ -79,9 +99,47 @@ def command(
         )
         say = partial(shared.reasons_of, angle_unit=angle_unit, is_whole=verbose, between=" ")
         reasons = _reasons(solution, module, times, options, say) if sweeps else ""
-    text = summary(solution, angle_unit)
+    text = "\n\n".join(
+        (summary(solution, angle_unit), *_answers(solution, angle_unit, lines, circles, dwells))
+    )
     given = text, output, angle_unit, has_forces, reasons
     shared.give_motion(context, solution, *given, is_whole=verbose)
+
+
+def _answers(
+    solution: kc.Solution,
+    angle_unit: str,
+    lines: tuple[str, ...],
+    circles: tuple[str, ...],
+    dwells: tuple[str, ...],
+) -> list[str]:
+    """Return a sentence for each path and each dwell that is asked for."""
+    found = []
+    for kind, given in (("straight", lines), ("circle", circles)):
+        measure = solution.straightness if kind == "straight" else solution.roundness
+        for text in given:
+            point, is_part, part = text.partition("=")
+            found.append(f"{measure(point, _numbers(kind, text, part, 2) if is_part else None)}")
+    for text in dwells:
+        name, _, part = text.partition("=")
+        factor = shown_unit(solution.column(name).unit, angle_unit)[1]
+        (within,) = _numbers("dwell", text, part, 1)
+        found += [
+            solution.dwell(name, within / factor, at).text(angle_unit) for at in ("max", "min")
+        ]
+    return ["\n".join(found)] if found else []
+
+
+def _numbers(option: str, text: str, part: str, count: int) -> list[float]:
+    """Return numbers that an option has, between colons."""
+    try:
+        found = [float(item) for item in part.split(":")]
+    except ValueError:
+        found = []
+    if len(found) != count:
+        form = "P=FROM:TO, as P=0.2:0.7" if count == 2 else "NAME=TOL, as ram.x=0.5"
+        raise InputError(f"--{option} {text}: give it as {form}.")
+    return found
 
 
 def _reasons(

@@ -1,6 +1,6 @@
 'use strict';
 /* What outputs do over the motion: extremes, dead points, time ratio, mean and RMS, as sol.measures()
-   finds them (kincompile/runtime/results/measures.py). Extremes lie between solved times: where a rate
+   finds them (kincompile/runtime/results/measures.py, shapes.py). Extremes lie between solved times: where a rate
    changes its sign, the motion is followed from the solved time beside it by the emitted solver. */
 
 const STILL = 1e-11;  // movement, relative to the largest number of its unit, that is a rounding error
@@ -8,6 +8,7 @@ const AT_REST = 1e-10;  // rate, relative to the largest, that is zero
 const REPEATS = 1e-7;  // difference, relative to its stroke, up to which an output repeats itself
 const LOCATED = 1e-13;  // part of the span of times to which a zero is located
 const ROOT_STEPS = 60;
+const STEP_PARTS = 8;  // of a step, at which a path is looked at
 
 class OutputMotion {
   /* An output over the times of a motion that were found. */
@@ -146,11 +147,54 @@ class OutputMotion {
     });
   }
 
+  /* The output at any time, by the polynomial of fifth degree of a step, as results/shapes.py has it. */
+  between(t) {
+    let [a, b] = [0, this.t.length - 1];
+    while (b - a > 1) {
+      const middle = (a + b) >> 1;
+      if (this.t[middle] <= t) a = middle; else b = middle;
+    }
+    const h = this.t[b] - this.t[a] || 1, s = (t - this.t[a]) / h, r = 1 - s;
+    const slope = (this.y_dot[b] - this.y_dot[a]) / h;
+    const [first, last] = [a, b].map(row => (Number.isFinite(this.y_ddot[row]) ? this.y_ddot[row] : slope));
+    return r ** 3 * ((1 + 3 * s + 6 * s * s) * this.y[a] + h * s * (1 + 3 * s) * this.y_dot[a] + h * h * s * s / 2 * first)
+      + s ** 3 * ((1 + 3 * r + 6 * r * r) * this.y[b] - h * r * (1 + 3 * r) * this.y_dot[b] + h * h * r * r / 2 * last);
+  }
+
+  /* The longest time for which it is within a distance of a level; a motion that ends as it began goes on. */
+  rest(level, within, dead) {
+    const isNear = t => Math.abs(this.between(t) - level) <= within * (1 + 1e-9);
+    const steps = this.t.slice(1).flatMap((t, a) => equalParts(this.t[a], t, STEP_PARTS).slice(0, -1));
+    const times = [...steps, this.t[this.t.length - 1], ...dead].sort((a, b) => a - b);
+    const edges = [];  // where it comes near, and where it goes
+    for (let k = 0; k + 1 < times.length; k++) {
+      let [low, high] = [times[k], times[k + 1]];
+      const wasNear = isNear(low);
+      if (wasNear === isNear(high)) continue;
+      for (let halvings = 0; halvings < ROOT_STEPS; halvings++) {
+        const middle = (low + high) / 2;
+        if (isNear(middle) === wasNear) low = middle; else high = middle;
+      }
+      edges.push((low + high) / 2);
+    }
+    const [start, end] = [times[0], times[times.length - 1]], last = this.t.length - 1;
+    if (isNear(start)) edges.unshift(start);
+    if (edges.length % 2) edges.push(end);
+    const rests = [];
+    for (let k = 0; k < edges.length; k += 2) rests.push(edges[k + 1] - edges[k]);
+    const isSame = (list, size) => Math.abs(list[last] - list[0]) <= REPEATS * size;
+    const goesOn = rests.length > 1 && isNear(start) && isNear(end)
+      && isSame(this.y, Math.max(...this.y) - Math.min(...this.y)) && isSame(this.y_dot, this.most);
+    if (goesOn) rests.push(rests[0] + rests[rests.length - 1]);
+    return Math.max(0, ...rests);
+  }
+
   measures() {
     const dead = this.deadPoints(), period = this.period(dead), [mean, square] = this.means();
     const [[tLeast, least], [tGreatest, greatest]] = [this.extreme(dead, -1), this.extreme(dead, 1)];
     return {
       name: this.name, unit: this.unit, least, tLeast, greatest, tGreatest, dead, period,
+      rests: part => [least, greatest].map(level => this.rest(level, part * (greatest - least), dead)),
       timeRatio: this.timeRatio(dead, period), mean, rms: Math.sqrt(Math.max(square, 0)),
     };
   }
@@ -192,12 +236,80 @@ const MEASURES = [
   ['rms', item => outputNumber(item, item.rms)],
 ];
 
+function equalParts(first, last, count) {
+  return [...Array(count + 1).keys()].map(k => first + k / count * (last - first));
+}
+
+/* The line and the circle of least squares of a path (x, y) over a part of the motion. */
+function pathMeasures(x, y, from, to) {
+  const count = STEP_PARTS * Math.max(x.t.filter(t => t > from && t < to).length + 1, 4);
+  const places = equalParts(from, to, count).map(t => [x.between(t), y.between(t)]);
+  const mean = of => places.reduce((sum, place) => sum + of(place), 0) / places.length;
+  const middle = [mean(p => p[0]), mean(p => p[1])];
+  const moment = (f, g) => mean(p => f(p[0] - middle[0], p[1] - middle[1]) * g(p[0] - middle[0], p[1] - middle[1]));
+  const [u, v, square] = [(a, b) => a, (a, b) => b, (a, b) => a * a + b * b];
+  const [xx, xy, yy] = [moment(u, u), moment(u, v), moment(v, v)];
+  const angle = Math.atan2(2 * xy, xx - yy) / 2, [c, s] = [Math.cos(angle), Math.sin(angle)];
+  const most = of => places.reduce((found, p) => Math.max(found, Math.abs(of(p))), 0);
+  const straight = most(([a, b]) => c * (b - middle[1]) - s * (a - middle[0]));
+  const solve = (a, b, d, e, f) => [(e * d - b * f) / (a * d - b * b), (a * f - b * e) / (a * d - b * b)];
+  let centre = solve(xx, xy, yy, moment(u, square) / 2, moment(v, square) / 2).map((value, k) => value + middle[k]);
+  const away = p => Math.hypot(p[0] - centre[0], p[1] - centre[1]);
+  let radius = mean(away);
+  for (let step = 0; step < ROOT_STEPS; step++) {
+    const way = k => p => (p[k] - centre[k]) / away(p), n = [mean(way(0)), mean(way(1))];
+    const sum = (f, g) => mean(p => f(p) * g(p)), off = [0, 1].map(k => p => way(k)(p) - n[k]);
+    const left = p => away(p) - radius;
+    const move = solve(sum(off[0], off[0]), sum(off[0], off[1]), sum(off[1], off[1]), sum(off[0], left), sum(off[1], left));
+    if (!move.every(Number.isFinite)) break;
+    centre = centre.map((value, k) => value + move[k]);
+    radius = mean(away);
+    if (Math.hypot(...move) <= 1e-15 * radius) break;
+  }
+  return { straight, angle: Math.abs(angle) < 1e-12 ? 0 : angle, round: most(p => away(p) - radius), radius, centre };
+}
+
 const measures = {
   solved: null,  // the motion whose measures are shown
+  within: 0.01,  // part of its stroke by which an output at rest may be off
+  part: [0, 1],  // of the motion, where paths are compared
 
   build(panel) {
     this.holder = document.createElement('div');
-    panel.append(this.holder);
+    const bar = document.createElement('p');
+    const box = (name, value, take) => {
+      const input = document.createElement('input');
+      Object.assign(input, { type: 'number', ariaLabel: name, value, min: 0, max: 100, step: 'any' });
+      input.style.width = '4.5em';
+      input.addEventListener('change', () => {
+        if (!(input.valueAsNumber >= 0 && input.valueAsNumber <= 100)) return;
+        take(input.valueAsNumber / 100);
+        this.solved = null;
+        this.show();
+      });
+      return input;
+    };
+    bar.append('At rest within ', box('at rest within', 1, x => { this.within = x; }), ' % of the stroke; paths from ',
+      box('paths from', 0, x => { this.part[0] = x; }), ' to ', box('paths to', 100, x => { this.part[1] = x; }), ' % of the time');
+    panel.append(bar, this.holder);
+  },
+
+  /* A table of the paths of points in the plane; nothing without any. */
+  paths(motion) {
+    const names = player.data.outputs.map(({ name }) => name);
+    const points = names.flatMap((name, k) => (name.startsWith('x_') ? [[name.slice(2), k, names.indexOf(`y_${name.slice(2)}`)]] : []))
+      .filter(([name, , y]) => y >= 0 && !names.includes(`z_${name}`));
+    const table = tableOf(['path', 'off a line', units.titled('at', 'rad'), 'off a circle', 'radius', 'centre']);
+    for (const [name, ...columns] of points) {
+      const [x, y] = columns.map(k => new OutputMotion(motion, k));
+      const [start, end] = [x.t[0], x.t[x.t.length - 1]];
+      const [from, to] = this.part.map(part => start + part * (end - start));
+      if (!(to > from)) continue;
+      const found = pathMeasures(x, y, from, to), list = values => values.map(shortNumber).join(', ');
+      const texts = [shortNumber(found.straight), shortNumber(found.angle * units.factor('rad')), shortNumber(found.round), shortNumber(found.radius), list(found.centre)];
+      table.tBodies[0].insertRow().append(cell(units.titled(name, x.unit), 'th'), ...texts.map(text => cell(text)));
+    }
+    return table.tBodies[0].rows.length ? [wide(table)] : [];
   },
 
   /* Of the motion that the page solved for last; the one it was made with is solved for once. */
@@ -211,6 +323,10 @@ const measures = {
     for (const [title, textOf] of MEASURES) {
       table.tBodies[0].insertRow().append(cell(title, 'th'), ...found.map(item => cell(textOf(item))));
     }
-    this.holder.replaceChildren(wide(table));
+    const rests = found.map(item => item.rests(this.within));
+    for (const [k, title] of ['rests at min [s]', 'rests at max [s]'].entries()) {
+      table.tBodies[0].insertRow().append(cell(title, 'th'), ...rests.map(item => cell(shortNumber(item[k]))));
+    }
+    this.holder.replaceChildren(wide(table), ...this.paths(motion));
   },
 };

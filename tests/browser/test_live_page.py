@@ -206,6 +206,29 @@ def test_that_measures_are_those_of_python(open_page: Callable[..., Any]) -> Non
             assert own["dead"] == pytest.approx(output.dead_points, abs=1e-9)
         shown = page.inner_text("#panel-measures")
         assert f"{known.outputs[0].least:.6g}" in shown
+        motion = kc.solve(kc.compile(model), np.linspace(0, 2, 61), values)
+        rests = page.evaluate(
+            "measuresOf(live.motionNow()).map(({ name, rests }) => [name, ...rests(0.02)])"
+        )
+        for name, *times in rests:
+            stroke = known[name].stroke
+            own = [motion.dwell(name, 0.02 * stroke, at).time for at in ("min", "max")]
+            assert times == pytest.approx(own, rel=1e-6, abs=1e-9), name
+        paths = page.evaluate(
+            """(() => { const motion = live.motionNow();
+            const names = player.data.outputs.map(x => x.name);
+            const of = name => new OutputMotion(motion, names.indexOf(name));
+            return names.filter(name => name.startsWith('x_')).map(name => [name.slice(2),
+                pathMeasures(of(name), of(`y_${name.slice(2)}`), 0.3, 1.1)]); })()"""
+        )
+        assert paths
+        for point, own in paths:
+            line, circle = (f(point, (0.3, 1.1)) for f in (motion.straightness, motion.roundness))
+            assert own["straight"] == pytest.approx(line.deviation, rel=1e-6, abs=1e-9)
+            assert own["round"] == pytest.approx(circle.deviation, rel=1e-6, abs=1e-9)
+            assert own["radius"] == pytest.approx(circle.radius, rel=1e-6)
+            assert own["centre"] == pytest.approx(circle.place, rel=1e-6, abs=1e-8)
+            assert f"{point} [" in shown
     page.close()
 
 

@@ -24,6 +24,7 @@ from kincompile.runtime.results.html import solution_html
 from kincompile.runtime.results.measures import measures
 from kincompile.runtime.results.observed import observed
 from kincompile.runtime.results.plot import plot_columns, plot_html
+from kincompile.runtime.results.shapes import Dwell, PathDeviation, dwell, path_deviation
 from kincompile.runtime.singular.events import BIFURCATION
 
 if TYPE_CHECKING:
@@ -224,6 +225,65 @@ class Solution(MotionTable):
             If the solution is one of variants, holds no point that was found, or was pickled.
         """
         return measures(self, code_of(self.require_module("its measures")), self.p)
+
+    def straightness(self, point: str, between: Any = None, line: Any = None) -> PathDeviation:
+        """Return how far the path of a point in the plane is from a straight line.
+
+        Parameters
+        ----------
+        point
+            Name of a point or a drawn joint, or of a body, whose origin is meant.
+        between
+            The part of the motion: two times, or the range of a column, as
+            ``{"crank.phi": (1, 2)}``; all of it without.
+        line
+            Two places (x, y) on the line; without, the line with the least sum of squared distances
+            at equal steps of time.
+
+        Returns
+        -------
+        PathDeviation
+            The largest distance to either side, when it is, and the line.
+
+        Raises
+        ------
+        InputError
+            If there is no such point, or no such part of the motion.
+        """
+        return path_deviation(self, point, between, "line", line)
+
+    def roundness(self, point: str, between: Any = None, circle: Any = None) -> PathDeviation:
+        """Return how far the path of a point in the plane is from a circle.
+
+        It is as `straightness`; `circle` is a centre and a radius, ``((x, y), r)``.
+        """
+        return path_deviation(self, point, between, "circle", circle)
+
+    def dwell(self, column: str, within: float, at: float | str = "max") -> Dwell:
+        """Return how long a column stays near a value: time, and how far each driver moves.
+
+        Parameters
+        ----------
+        column
+            A coordinate or an output.
+        within
+            How far it may be from the value, in its unit, to either side.
+        at
+            The value, or ``"max"`` or ``"min"``: its greatest or least one.
+
+        Returns
+        -------
+        Dwell
+            The longest dwell. Of a motion that ends as it began, one that goes on behind the end is
+            one.
+
+        Raises
+        ------
+        InputError
+            If there is no such column, or the tolerance is not positive.
+        """
+        code = code_of(self.require_module("its dwells"))
+        return dwell(self, code, self.p, column, within, at)
 
     def plot(
         self,

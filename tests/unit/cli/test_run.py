@@ -303,3 +303,33 @@ def test_that_a_start_on_another_branch_than_drawn_is_said_once(kincompile, tmp_
         said = "(B is drawn left of the line A C, and found right of it)"
         assert (done.exit_code, done.stderr.count(said)) == (0, count)
         assert done.stderr.count("Warning: The position at t = 0 is on another branch") == count
+
+
+def test_that_paths_and_dwells_are_asked_for(kincompile, pendulum):
+    """The bob's origin stands still; its angle rises by 2 rad/s to 4.5 rad."""
+    done = kincompile("run", pendulum, "--dwell", "bob.phi=30", "--deg")
+    assert done.exit_code == 0, done.stderr
+    last = done.stdout.splitlines()[-2:]
+    assert last[0].startswith("phi_bob is within 30 of 257.831 deg for 0.261799 s, from t = 1.7382")
+    assert last[1].startswith("phi_bob is within 30 of 28.6479 deg for 0.261799 s, from t = 0 to")
+    done = kincompile("run", pendulum, "--straight", "bob=0.5:1", "--circle", "bob")
+    straight, circle = done.stdout.splitlines()[-2:]
+    assert straight.startswith("bob keeps within ")
+    assert "of the line through" in straight
+    assert "from t = 0.5 to 1;" in straight
+    assert "of the circle of radius" in circle
+
+
+@pytest.mark.parametrize(
+    ("option", "text", "words"),
+    [
+        ("--straight", "bob=0.5", "give it as P=FROM:TO"),
+        ("--dwell", "bob.phi", "give it as NAME=TOL"),
+        ("--circle", "leg", "leg"),
+    ],
+)
+def test_what_cannot_be_asked_for(kincompile, pendulum, option, text, words):
+    done = kincompile("run", pendulum, option, text)
+    assert done.exit_code != 0
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
