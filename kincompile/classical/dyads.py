@@ -278,9 +278,7 @@ def _centre(places: Sequence[Complex]) -> Complex:
     first, *others = places
     b, c = (other - first for other in others)
     across = 2 * (np.conj(b) * c).imag
-    flat = np.abs(across) < SLIGHT * np.abs(b) * np.abs(c)
-    middle = 1j * (b * np.abs(c) ** 2 - c * np.abs(b) ** 2) / np.where(flat, 0, across)
-    return np.asarray(first + middle)
+    return np.asarray(first + 1j * (b * np.abs(c) ** 2 - c * np.abs(b) ** 2) / across)
 
 
 def _dyad(w: complex, m: complex, p: complex, r: complex, size: float, first: Array) -> Dyad:
