@@ -17,7 +17,7 @@ from scipy.interpolate import BPoly
 from scipy.optimize import brentq
 
 from kincompile.design.columns import Column, column_of
-from kincompile.design.targets import Limit, Moves, Passing, TimeRatio
+from kincompile.design.targets import Limit, Moves, Passing, Shaped, TimeRatio
 from kincompile.errors import InputError
 from kincompile.names import rate
 from kincompile.runtime.engine.code import code_of
@@ -51,6 +51,7 @@ class Demands:
     """Targets with their columns, for a module."""
 
     passing: tuple[tuple[Passing, tuple[Column, ...]], ...]  # each target with its columns
+    shaped: tuple[tuple[Shaped, tuple[Column, ...]], ...]  # each with its columns, at grid times
     # The passing targets whose times are found, each with the first and last time allowed.
     free: tuple[tuple[float, float], ...]
     # Each limit with its column, and whether it depends on parameters alone.
@@ -61,7 +62,7 @@ class Demands:
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the coordinates and outputs whose derivatives are needed."""
-        of = [column.of for _, columns in self.passing for column in columns]
+        of = [column.of for _, columns in (*self.passing, *self.shaped) for column in columns]
         of += [column.of for _, column, _ in self.limits]
         of += [column.of for _, column in self.ratios]
         return tuple(dict.fromkeys(of))
@@ -124,6 +125,11 @@ def read_demands(
         for target in targets
         if isinstance(target, Passing)
     )
+    shaped = tuple(
+        (item, tuple(column(name, item.title) for name in item.columns))
+        for item in targets
+        if isinstance(item, Shaped)
+    )
     ratios = tuple(
         (item, column(item.column, item.title, 2))
         for item in targets
@@ -155,7 +161,8 @@ def read_demands(
         if target.times is None
     )
     grid = np.linspace(0.0, end, GRID) if whole else np.empty(0)
-    return Demands(passing, free, tuple(limits), ratios, grid)
+    grid = np.unique(np.concatenate([grid, *(item.times for item, _ in shaped)]))
+    return Demands(passing, shaped, free, tuple(limits), ratios, grid)
 
 
 def limit_name(number: int) -> str:
@@ -175,6 +182,22 @@ def deviation(wanted: Array, column: Column, got: Array) -> Array:
     if column.unit == "rad" and column.order == 0:
         off = (off + math.pi) % (2 * math.pi) - math.pi
     return off
+
+
+def compared(target: Shaped, values: Array, slopes: Array | None = None) -> tuple[Array, Array]:
+    """Return weighted deviations from a shape, and their derivatives by k parameters.
+
+    Of values (K, c) at its times, and of their derivatives (K, c, k). The shape moves with the
+    values: what it may take away is left out, so that the gradient of the sum of squares is exact
+    (Kaufman 1975).
+    """
+    found = target.nearest(values, target.given)
+    if slopes is None:
+        return target.weight * found.offsets, np.zeros((len(values), 0))
+    by_p = np.einsum("kc,kcp->kp", found.slopes, slopes)
+    if found.free.size:
+        by_p -= found.free @ np.linalg.lstsq(found.free, by_p, rcond=None)[0]
+    return target.weight * found.offsets, target.weight * by_p
 
 
 @dataclass(frozen=True, slots=True)

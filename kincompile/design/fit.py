@@ -25,7 +25,7 @@ from kincompile.design.demands import limit_name, read_demands
 from kincompile.design.deviation import MOST
 from kincompile.design.fitted import Counts, Fit, fitted
 from kincompile.design.search import Search
-from kincompile.design.targets import Limit, Moves, Passing, TimeRatio
+from kincompile.design.targets import Limit, Moves, Passing, Shaped, TimeRatio
 from kincompile.design.trial import EAGERNESS, Trial, Workbench
 from kincompile.design.variation import require_mechanism
 from kincompile.errors import InputError, KincompileWarning, UnsupportedError
@@ -155,14 +155,14 @@ def _rank(trial: Trial) -> tuple[bool, float]:
 
 def _targets(given: Any) -> list[Target]:
     """Return the targets as a list; refuse anything else."""
-    kinds = (Passing, TimeRatio, Limit, Moves)
+    kinds = (Passing, Shaped, TimeRatio, Limit, Moves)
     found = [given] if isinstance(given, kinds) or not isinstance(given, Iterable) else list(given)
     problems = [
         f"{item!r} is not a target: make one with kc.targets.path, value, pose, time_ratio or limit"
         for item in found
         if not isinstance(item, kinds)
     ]
-    if not any(isinstance(item, Passing | TimeRatio) for item in found) and not problems:
+    if not any(isinstance(item, Passing | Shaped | TimeRatio) for item in found) and not problems:
         problems.append("there is nothing to reach: give a path, values, poses or a time ratio")
     if problems:
         raise InputError(problems)

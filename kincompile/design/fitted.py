@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.compiler import compile as compile_model
-from kincompile.design.demands import Extremes, deviation, orders_of, sides
+from kincompile.design.demands import Extremes, compared, deviation, orders_of, sides
 from kincompile.design.variation import with_values
 from kincompile.errors import KincompileWarning
 from kincompile.html import Shown, table_html
@@ -296,6 +296,13 @@ def _reached(demands: Demands, best: Trial, count: int) -> list[Reached]:
                         target.title, float(at[j]), column.name, column.unit, wanted, got, off, near
                     )
                 )
+    for shape, columns in demands.shaped:
+        places = np.searchsorted(motion.t, shape.times)
+        values = np.column_stack([motion[item.name][places] for item in columns])
+        sizes = np.abs(compared(shape, values)[0]) / shape.weight
+        far, when = float(sizes.max()), float(shape.times[np.argmax(sizes)])
+        title, unit = shape.title, columns[0].unit
+        rows.append(Reached(title, when, title, unit, 0.0, far, far, far <= shape.within))
     first = best.residuals.size - len(demands.ratios)
     for (ratio, _), residual in zip(demands.ratios, best.residuals[first:].tolist(), strict=True):
         off = residual / ratio.weight

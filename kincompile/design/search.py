@@ -17,7 +17,7 @@ from scipy import optimize
 from scipy.stats import qmc
 
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
-from kincompile.design.demands import deviation, sides
+from kincompile.design.demands import compared, deviation, sides
 from kincompile.design.trial import EAGERNESS
 from kincompile.errors import KincompileWarning
 from kincompile.runtime.engine.code import code_of
@@ -227,6 +227,10 @@ class Search:
             total += error
             own = self._times[inside][chosen]
             times.append(np.concatenate((own[:, :1], np.diff(own, axis=1)), axis=1))
+        for shape, columns in self.demands.shaped:
+            when = np.searchsorted(self._times, shape.times)
+            paths = np.stack([seen[x.of, x.order][:, when] for x in columns], axis=-1)
+            total += [np.sum(compared(shape, path)[0] ** 2) for path in paths]
         on_grid = np.searchsorted(self._times, self.demands.grid)
         for item, column, is_constant in self.demands.limits:
             places = slice(0, 1) if is_constant else on_grid
@@ -235,9 +239,9 @@ class Search:
                 total += EAGERNESS**2 * (np.minimum(gap, 0.0) ** 2).sum(axis=1)
         for ratio, column in self.demands.ratios:
             y = seen[column.of, column.order][:, on_grid]
-            step = self.demands.grid[1] - self.demands.grid[0]
-            whole = self.demands.grid[-1] - self.demands.grid[0]
-            rise = ((y.argmax(axis=1) - y.argmin(axis=1)) * step) % whole
+            grid = self.demands.grid
+            step, whole = grid[1] - grid[0], grid[-1] - grid[0]
+            rise = (grid[y.argmax(axis=1)] - grid[y.argmin(axis=1)]) % whole
             got = rise / np.maximum(whole - rise, step)
             total += (ratio.weight * (got - ratio.ratio)) ** 2
         total = np.where(np.isfinite(total), total, np.inf)

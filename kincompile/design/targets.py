@@ -5,6 +5,9 @@ kc.targets.path("P", points, times=[0.1, 0.2])                 at these times
 kc.targets.value("rocker.phi", angles, times)                  function generation; rates too
 kc.targets.pose("rod", [(1, 2, 0.3), (1.5, 2.2, 0.5)])         a body goes through poses
 kc.targets.time_ratio("ram.x", 1.4)                            forth takes 1.4 times as long as back
+kc.targets.straight("P", (0.2, 0.7), within=0.1)               a path is straight between times
+kc.targets.circular("P", (0.2, 0.7), within=0.1)               or a part of a circle
+kc.targets.dwell("ram.x", (0.4, 0.6), within=0.5)              an output rests
 kc.targets.limit("mu", 40 * kc.deg, 140 * kc.deg)           a transmission angle, over the motion
 kc.targets.limit(b / a, most=4)                                of dimensions
 kc.targets.moves()                                             assembled at all times: full rotation
@@ -23,17 +26,24 @@ from kincompile.errors import InputError
 from kincompile.model.expressions import number_in
 from kincompile.model.tasks import PART
 from kincompile.names import column_name, shown
+from kincompile.runtime.results.shapes import nearest_circle, nearest_level, nearest_line
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from typing import TypeAlias
 
     from numpy.typing import ArrayLike, NDArray
 
+    from kincompile.runtime.results.shapes import Nearest
+
     Array = NDArray[np.float64]
-    Target: TypeAlias = "Passing | TimeRatio | Limit | Moves"
+    Target: TypeAlias = "Passing | Shaped | TimeRatio | Limit | Moves"
 
 MOST_POINTS = 1000
 """Points of one target."""
+
+PLACES = 25
+"""Equally spaced times at which a path or a dwell is looked at."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +93,19 @@ class TimeRatio:
     def title(self) -> str:
         """What it is called in reports."""
         return f"time ratio of {self.column}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shaped:
+    """Columns are to keep near a line, a circle or a level that is found or given, for a while."""
+
+    title: str
+    columns: tuple[str, ...]
+    nearest: Callable[[Array, Any], Nearest]
+    given: Any
+    times: Array  # (K,)
+    weight: float
+    within: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,6 +239,91 @@ def time_ratio(
     return TimeRatio(column_name(column), found, float(weight), float(within))
 
 
+def straight(
+    point: str,
+    between: tuple[float, float],
+    *,
+    line: ArrayLike | None = None,
+    weight: float = 1.0,
+    within: float,
+) -> Shaped:
+    """Return the demand that the path of a point in the plane is straight, as `sol.straightness`.
+
+    Parameters
+    ----------
+    point
+        Name of a point, ``"P"``, or of a body, whose origin is meant.
+    between
+        The first and the last time; 25 equally spaced times are looked at.
+    line : array_like, shape (2, 2), optional
+        Two places on the line [length]; without, it may lie anywhere.
+    weight
+        Factor of its deviations, among other targets.
+    within
+        Distance from the line that counts as reached [length].
+
+    Raises
+    ------
+    InputError
+        If numbers are missing or not finite, or the times are in the wrong order.
+    """
+    ends = None if line is None else _numbers(line, f"the line of {point!r}", 2)
+    if ends is not None and (ends.shape != (2, 2) or (ends[0] == ends[1]).all()):
+        raise InputError(f"the line of {point!r} has no direction: give two places (x, y) on it")
+    names = (f"x_{point}", f"y_{point}")
+    title = f"straightness of {point}"
+    return _shaped(title, names, nearest_line, ends, between, weight, within)
+
+
+def circular(
+    point: str,
+    between: tuple[float, float],
+    *,
+    circle: ArrayLike | None = None,
+    weight: float = 1.0,
+    within: float,
+) -> Shaped:
+    """Return the demand that the path of a point in the plane is a part of a circle.
+
+    Parameters
+    ----------
+    circle : array_like, shape (3,), optional
+        x and y of its centre and its radius [length]; without, it may be any.
+    point, between, weight, within
+        As for `straight`, which also says what is refused.
+    """
+    given = None if circle is None else _numbers(circle, f"the circle of {point!r}", 1)
+    if given is not None and (given.size != 3 or not given[2] > 0):
+        raise InputError(f"the circle of {point!r} needs x, y of its centre and a positive radius")
+    names = (f"x_{point}", f"y_{point}")
+    title = f"roundness of {point}"
+    return _shaped(title, names, nearest_circle, given, between, weight, within)
+
+
+def dwell(
+    column: str,
+    between: tuple[float, float],
+    *,
+    at: float | None = None,
+    weight: float = 1.0,
+    within: float,
+) -> Shaped:
+    """Return the demand that a column rests from one time to another.
+
+    Parameters
+    ----------
+    column
+        A coordinate, an output, or a rate.
+    at
+        Where, in its unit; without, anywhere.
+    between, weight, within
+        As for `straight`, which also says what is refused.
+    """
+    level = None if at is None else _number(at, f"the dwell of {column!r}")
+    title, names = f"dwell of {column}", (column_name(column),)
+    return _shaped(title, names, nearest_level, level, between, weight, within)
+
+
 def limit(what: Any, least: Any = -math.inf, most: Any = math.inf, *, title: str = "") -> Limit:
     """Return the demand that something stays between two values at all times of the model.
 
@@ -253,6 +361,27 @@ def limit(what: Any, least: Any = -math.inf, most: Any = math.inf, *, title: str
 def moves() -> Moves:
     """Return the demand that the mechanism moves through all times of the model: a full turn."""
     return Moves()
+
+
+def _shaped(
+    title: str,
+    columns: tuple[str, ...],
+    nearest: Callable[[Array, Any], Nearest],
+    given: Any,
+    between: tuple[float, float],
+    weight: float,
+    within: float,
+) -> Shaped:
+    """Return a demand over a part of the motion, checked."""
+    ends = _numbers(between, f"the times of {title}", 1)
+    if ends.size != 2 or not ends[0] < ends[1]:
+        raise InputError(
+            f"{title} is asked for between {shown(between)}: give the first time first"
+        )
+    if not (weight > 0 and within > 0):
+        raise InputError(f"{title} has weight and within: give positive numbers")
+    times = np.linspace(ends[0], ends[1], PLACES)
+    return Shaped(title, columns, nearest, given, times, float(weight), float(within))
 
 
 def _passing(

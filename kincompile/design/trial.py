@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
-from kincompile.design.demands import ORDERS, Extremes, deviation, orders_of, sides, turning
+from kincompile.design.demands import (
+    ORDERS,
+    Extremes,
+    compared,
+    deviation,
+    orders_of,
+    sides,
+    turning,
+)
 from kincompile.errors import KincompileWarning
 from kincompile.runtime.follow import follow
 from kincompile.runtime.inputs import read_inputs
@@ -134,6 +142,15 @@ class Workbench:
                     )
                 yield weight * off, by_p, by_t
             first += at.size if is_free else 0
+        for shape, columns in self.demands.shaped:
+            places = np.searchsorted(motion.t, shape.times)
+            values = np.column_stack([motion[item.name][places] for item in columns])
+            slopes = None
+            if found is not None:
+                parts = [self._by_parameters(found, item)[0, places] for item in columns]
+                slopes = np.stack(parts, axis=1)
+            off, by_p = compared(shape, values, slopes)
+            yield off, by_p, np.zeros((off.size, len(self.demands.time_bounds())))
         for ratio, column in self.demands.ratios:
             yield self._ratio(motion, ratio, column, found)
 

@@ -208,6 +208,44 @@ class TimeRatio(Reached):
 
 
 @declared
+class Shaped(Reached):
+    """Fields of targets over a part of the motion."""
+
+    between: Any = given(kind.PAIR, "The first and the last time.", kw_only=True)
+    within: float = given(kind.CONSTANT, "Deviation that counts as reached.", kw_only=True)
+
+
+@declared
+class Straight(Shaped):
+    """The path of a point is straight."""
+
+    straight: str = given(kind.TEXT, "Name of a point, or of a body, whose origin is meant.")
+    line: Any = given(
+        _ROWS, "Two places on the line; any line without.", default=None, unit="length",
+        kw_only=True,
+    )  # fmt: skip
+
+
+@declared
+class Circular(Shaped):
+    """The path of a point is a part of a circle."""
+
+    circular: str = given(kind.TEXT, "Name of a point, or of a body, whose origin is meant.")
+    circle: Any = given(
+        kind.array(kind.CONSTANT), "x, y of its centre and its radius; any circle without.",
+        default=None, unit="length", kw_only=True,
+    )  # fmt: skip
+
+
+@declared
+class Dwell(Shaped):
+    """A column rests."""
+
+    dwell: str = given(kind.TEXT, "A coordinate, an output, or a rate.")
+    at: float | None = given(kind.CONSTANT, "Where; anywhere without.", default=None, kw_only=True)
+
+
+@declared
 class Limit:
     """A column, or a formula of parameters, stays between two values."""
 
@@ -225,7 +263,7 @@ class Moves:
 
 
 TARGETS: Mapping[str, type] = {
-    "path": Path, "value": Value, "pose": Pose, "time_ratio": TimeRatio, "limit": Limit,
-    "moves": Moves,
+    "path": Path, "value": Value, "pose": Pose, "straight": Straight, "circular": Circular,
+    "dwell": Dwell, "time_ratio": TimeRatio, "limit": Limit, "moves": Moves,
 }  # fmt: skip
 """Targets of a fit: functions of `kc.targets`, and what a file says of each."""

@@ -165,7 +165,7 @@ def nearest_line(values: Array, given: Any = None) -> Nearest:
 
 
 def nearest_circle(values: Array, given: Any = None) -> Nearest:
-    """Return the circle with the least sum of squared distances, or a given one, (centre, radius).
+    """Return the circle with the least sum of squared distances, or a given one, (x, y, radius).
 
     It starts from that whose equation, linear in the centre, is met best (Kasa 1976).
     """
@@ -184,7 +184,7 @@ def nearest_circle(values: Array, given: Any = None) -> Nearest:
                 break
         place, radius = middle + size * found[:2], size * float(found[2])
     else:
-        place, radius = np.array(given[0], dtype=np.float64), float(given[1])
+        place, radius = np.array(given[:2], dtype=np.float64), float(given[2])
     offsets, away = _from_circle(values, np.array([*place, radius]))
     free = -np.column_stack((away, np.ones(len(away))))
     return Nearest(

@@ -255,7 +255,7 @@ class Solution(MotionTable):
     def roundness(self, point: str, between: Any = None, circle: Any = None) -> PathDeviation:
         """Return how far the path of a point in the plane is from a circle.
 
-        It is as `straightness`; `circle` is a centre and a radius, ``((x, y), r)``.
+        It is as `straightness`; `circle` is a centre and a radius, ``(x, y, r)``.
         """
         return path_deviation(self, point, between, "circle", circle)
 

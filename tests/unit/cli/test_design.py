@@ -132,11 +132,22 @@ targets = [
     { limit = "rod.phi", least = "-80*deg", most = "80*deg" },
     { limit = "r", most = 0.15 },
     { time_ratio = "ram.x", ratio = 1.0, within = 9 },
+    { straight = "ram", between = [0, 0.4], within = 9, line = [[0, 0], [1, 0]] },
+    { circular = "ram", between = [0, 0.4], within = 9, circle = [0, 0, 0.4] },
+    { dwell = "crank.phi", between = [0, 0.1], within = 9, at = "30*deg" },
 ]
 """
     done = kincompile("fit", file(table))
     assert done.exit_code == 0, done.stderr
-    for word in ("x_ram", "phi_crank", "rod.phi", "time ratio of x_ram"):
+    for word in (
+        "x_ram",
+        "phi_crank",
+        "rod.phi",
+        "time ratio of x_ram",
+        "straightness of ram",
+        "roundness of ram",
+        "dwell of crank.phi",
+    ):
         assert word in done.stdout
 
 

@@ -83,6 +83,99 @@ def test_derivatives_of_deviations_and_limits_are_exact(targets):
             np.testing.assert_allclose(own[:, k], slope, rtol=2e-7, atol=2e-8)
 
 
+@pytest.mark.parametrize(
+    ("target", "is_exact"),
+    [
+        (kc.targets.straight("P", (0.5, 2.0), within=0.1, weight=2.0), False),
+        (kc.targets.circular("P", (0.5, 2.0), within=0.1, weight=2.0), False),
+        (kc.targets.dwell("rocker.phi", (0.5, 2.0), within=0.1), True),
+        (kc.targets.dwell("rocker.phi", (0.5, 2.0), at=1.8, within=0.1), True),
+        (kc.targets.straight("P", (0.5, 2.0), line=[(0, 1), (3, 2)], within=0.1), True),
+        (kc.targets.circular("P", (0.5, 2.0), circle=(1, 1, 2), within=0.1), True),
+    ],
+)
+def test_derivatives_of_deviations_from_a_shape(target, is_exact):
+    """Those of the sum of squares are exact, those of each where nothing is chosen as well."""
+    names = ("r1", "r2", "r3", "r4", "u", "v")
+    tried, module = bench(fourbar(), [target], names)
+    x, guess = np.array([3.7, 2.0, 4.0, 2.7, 1.7, 1.6]), np.array(module.GUESS)
+    trial = tried.solved(x, guess)
+    found, _ = tried.derivatives(trial)
+    h, gradient = 1e-5, []
+    for k in range(x.size):
+        step = h * np.eye(x.size)[k]
+        up, down = tried.solved(x + step, guess), tried.solved(x - step, guess)
+        gradient.append((up.error - down.error) / (2 * h))
+        if is_exact:
+            slope = (up.residuals - down.residuals) / (2 * h)
+            np.testing.assert_allclose(found[:, k], slope, rtol=2e-7, atol=2e-8)
+    assert np.abs(gradient).max() > 1e-3
+    np.testing.assert_allclose(2 * trial.residuals @ found, gradient, rtol=1e-6, atol=1e-7)
+
+
+def hoekens_offsets(r1):
+    """Return how far Hoeken's path is from its line, by two circles; lengths r1, 1, 2.5, 2.5, 5."""
+    a = np.exp(1j * np.linspace(math.pi / 2, 1.5 * math.pi, 25))
+    way = r1 - a
+    b = a + way * (0.5 + 1j * np.sqrt((2.5 / np.abs(way)) ** 2 - 0.25))
+    path = 2 * b - a
+    centred = np.column_stack((path.real, path.imag)) - (path.real.mean(), path.imag.mean())
+    return centred @ np.linalg.svd(centred)[2][1]
+
+
+def test_the_straightest_hoeken_linkage():
+    """Of lengths 1, 2.5, 2.5 the best distance of pivots, by a search along the closed form."""
+    m = fourbar("hoeken", r1=2.3, r2=1.0, r3=2.5, r4=2.5, u=5.0, v=0.0)
+    target = kc.targets.straight("P", (math.pi / 2, 1.5 * math.pi), within=0.02)
+    found = kc.fit(m, target, bounds={"r1": (1.8, 2.4)}, samples=16, starts=2)
+    best = minimize_scalar(
+        lambda r1: np.sum(hoekens_offsets(r1) ** 2), bounds=(1.8, 2.4), method="bounded",
+        options={"xatol": 1e-10},
+    )  # fmt: skip
+    assert found.parameters["r1"] == pytest.approx(best.x, abs=1e-5)
+    assert found.error == pytest.approx(best.fun, rel=1e-8)
+    assert found.success
+    (reached,) = found.reached
+    assert reached.off == pytest.approx(np.abs(hoekens_offsets(best.x)).max(), rel=1e-4)
+    assert "straightness of P" in found.to_text()
+
+
+def test_a_circle_beside_a_time_ratio_and_a_dwell_that_is_far():
+    """B goes round A with the crank, whose length is found; the rocker rests nowhere."""
+    m = fourbar()
+    m.point("B1", m.bodies[0], (sympy.Symbol("r2"), 0))
+    targets = [
+        kc.targets.circular("B1", (0.5, 4.0), circle=(0, 0, 1.9), within=1e-6),
+        kc.targets.time_ratio("rocker.phi", 1.2),
+    ]
+    bounds = {"r2": (1.8, 2.1), "r1": (3.5, 4.2), "r4": (2.4, 3.0)}
+    found = kc.fit(m, targets, bounds=bounds, samples=64, starts=4)
+    assert found.success
+    assert found.parameters["r2"] == pytest.approx(1.9, abs=1e-6)
+    rest = kc.targets.dwell("rocker.phi", (0.5, 4.0), within=1e-3)
+    far = kc.fit(m, rest, bounds={"r4": (2.4, 3.0)}, samples=16, starts=2)
+    assert not far.success
+    assert "dwell of rocker.phi" in far.message
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: kc.targets.straight("P", (2, 1), within=1), "give the first time first"),
+        (lambda: kc.targets.straight("P", (1, 2), within=0), "give positive numbers"),
+        (
+            lambda: kc.targets.straight("P", (1, 2), line=[(0, 0), (0, 0)], within=1),
+            "has no direction",
+        ),
+        (lambda: kc.targets.circular("P", (1, 2), circle=(0, 0, -1), within=1), "positive radius"),
+        (lambda: kc.targets.dwell("P.x", (1, 2), at="top", within=1), "not a finite number"),
+    ],
+)
+def test_shapes_that_cannot_be_asked_for(make, words):
+    with pytest.raises(kc.InputError, match=words):
+        make()
+
+
 def test_freudensteins_three_precision_points_are_reached():
     # y = x^1.5 on 1..4, Chebyshev's spacing; lengths by Freudenstein's linear equations, d = 1.
     x = np.array([1.20096189432334, 2.5, 3.79903810567666])

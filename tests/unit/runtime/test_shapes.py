@@ -94,7 +94,7 @@ def test_a_given_line_and_circle():
     level = found.straightness("P", (0.25, 0.75), line=((0, 400), (1, 400)))
     path = hoeken_path(2 * np.pi * np.linspace(0.25, 0.75, 721))
     assert level.deviation == pytest.approx(np.abs(path.imag - 400).max(), abs=1e-8)
-    circle = found.roundness("B", circle=((200, 1), 250))
+    circle = found.roundness("B", circle=(200, 1, 250))
     assert circle.deviation == pytest.approx(1.0, rel=0.05)
 
 
