@@ -59,6 +59,7 @@ length = cylinder_length + cylinder_stroke * progress
 reach = extension_reach + extension_stroke * progress
 mechanism.add(kc.TranslationalDistance("lift", barrel, foot, along, rod, head, length))
 mechanism.add(kc.TranslationalDistance("extend", boom, mouth, along, extension, tip, reach))
+mechanism.output("height", hook.y, "m")
 
 if __name__ == "__main__":
     module = kc.compile(mechanism)

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import warnings
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from kincompile.compiler import compile as compile_model
 from kincompile.design.fitted import DIMENSIONS, KEPT, REACHED
 from kincompile.design.tolerance_analysis import TITLES
+from kincompile.errors import KincompileWarning
 from kincompile.html import framed_html
 from kincompile.report.document import Chapter, Manuscript, table, text
+from kincompile.report.plot import Layer, plot_svg
 from kincompile.report.to_html import as_html
+from kincompile.runtime.results.columns import titled
+from kincompile.runtime.solve import solve
 from kincompile.view.page import page
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from kincompile.design.fitted import Fit
     from kincompile.design.tolerance_analysis import ToleranceAnalysis
+    from kincompile.runtime.results.solution import Solution
+
+WANTED: dict[str, Any] = {"colour": "var(--numeric)", "name": "wanted"}
+"""How a plot shows what was wanted."""
 
 HEIGHT = "900px"
 """Of the page of a mechanism within the page of its fit."""
@@ -36,7 +50,7 @@ def tolerance_page(found: ToleranceAnalysis) -> str:
 
 
 def fit_page(found: Fit) -> str:
-    """Return the page of a fit as one HTML file: tables, and the mechanism, which moves."""
+    """Return the page of a fit as one HTML file: tables, plots, and the mechanism, which moves."""
     chapters = [
         Chapter("effort", ("How it was found",), (text(found.effort()),)),
         Chapter("dimensions", ("Dimensions",), (table(DIMENSIONS, found.dimensions()),)),
@@ -44,7 +58,37 @@ def fit_page(found: Fit) -> str:
     ]
     if found.limits:
         chapters.append(Chapter("limits", ("Limits",), (table(KEPT, found.kept()),)))
-    name = found.model.name
-    moving = f"<h2>{name}</h2>{framed_html(page(found.model).html, name, HEIGHT)}"
+    name, model = found.model.name, found.model
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", KincompileWarning)  # the fit has said them
+        motion = solve(compile_model(model), np.linspace(0, model.end, model.points))
+    plots = "\n".join((*_over_time(found, motion), *_paths(found, motion)))
+    moving = f"<h2>{name}</h2>{framed_html(page(model, motion).html, name, HEIGHT)}"
     manuscript = Manuscript(name, found.message, tuple(chapters))
-    return as_html(manuscript, "Synthesis of", after=moving)
+    return as_html(manuscript, "Synthesis of", after=f"<p>{plots}</p>{moving}")
+
+
+def _over_time(found: Fit, motion: Solution) -> Iterator[str]:
+    """Yield a plot of each column with targets: what was found, and what was wanted."""
+    for name in dict.fromkeys(item.column for item in found.reached):
+        items = [item for item in found.reached if item.column == name]
+        # Of angles the turn that was found.
+        wanted = np.array([(item.t, item.got - item.off) for item in items]).T
+        title = titled(name, items[0].unit)
+        layers = Layer("line", motion.t, motion[name]), Layer("dots", *wanted, **WANTED)
+        yield plot_svg(f"{title} over time, and what was wanted", "t [s]", title, layers)
+
+
+def _paths(found: Fit, motion: Solution) -> Iterator[str]:
+    """Yield the path of each point whose two coordinates have targets, in one scale."""
+    wanted = {(item.column, item.t): item for item in found.reached}
+    points = (name.removeprefix("x_") for name, _ in wanted if name.startswith("x_"))
+    for point in dict.fromkeys(points):
+        names = f"x_{point}", f"y_{point}"
+        times = [t for name, t in wanted if name == names[0] and (names[1], t) in wanted]
+        if not times:
+            continue
+        dots = (np.array([wanted[name, t].wanted for t in times]) for name in names)
+        layers = Layer("line", *(motion[name] for name in names)), Layer("dots", *dots, **WANTED)
+        labels = (titled(name, motion.units.get(name, "")) for name in names)
+        yield plot_svg(f"Path of {point}, and what was wanted", *labels, layers, is_true=True)

@@ -120,7 +120,10 @@ def checked_expression(
     try:
         value = as_expression(given)
     except NotAnExpressionError as error:
-        scope.problems.append(f"{where}: {error}; give a finite number or a SymPy expression")
+        expected = "give a finite number or a SymPy expression"
+        if isinstance(given, str):
+            expected += ", as 2*kc.pi*kc.t; text is for model files"
+        scope.problems.append(f"{where}: {error}; {expected}")
         return None
     if not isinstance(value, sympy.Expr):
         return value

@@ -81,9 +81,9 @@ WORDS = {
     "before": "The {before} points before it are good",
     "followed": "; the motion was followed to t = {t}",
     # There is no motion yet where a first point does not converge.
-    "not assembled": f"{CANNOT_BE} at this time (change lengths, or what the drivers demand), or "
-    "the guess is too far away (give one nearer to the assembled mechanism; kc.assemblies(module) "
-    "looks for positions).",
+    "not assembled": f"{CANNOT_BE} at this time, or the guess is too far away. Change lengths, or "
+    "what the drivers demand, or give a guess nearer to the assembled mechanism; "
+    "kc.assemblies(module) looks for positions.",
     "exhausted": f"Between these two times {criteria.MAX_SUBSTEPS:,} steps were not enough: ask "
     "for more times.",
     "found": "The position there was found.",

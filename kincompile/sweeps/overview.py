@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from kincompile.criteria import NOISE
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.sweeps.layout import STATUS
 from kincompile.tables import table
@@ -93,6 +94,8 @@ class Overview:
     def _row(self, item: Found, angle_unit: str) -> list[str]:
         unit, factor = shown_unit(item.kept.unit, angle_unit)
         numbers = (item.least.value, item.greatest.value, item.mean)
+        noise = NOISE * max(map(abs, numbers[:2]))
+        numbers = tuple(0.0 if abs(x) <= noise else x for x in numbers)
         least, greatest, mean = (f"{factor * x:.6g}" if math.isfinite(x) else "-" for x in numbers)
         at, where = self._place(item.least, angle_unit), self._place(item.greatest, angle_unit)
         return [item.kept.name, unit, least, at, greatest, where, mean]

@@ -318,7 +318,8 @@ const measures = {
     if (motion === this.solved && units.angle === this.angle) return;
     this.solved = motion;
     this.angle = units.angle;
-    const found = measuresOf(motion);
+    const order = named(player.data).map(({ name }) => name);
+    const found = measuresOf(motion).sort((a, b) => order.indexOf(a.name) - order.indexOf(b.name));
     const table = tableOf(['', ...found.map(({ name, unit }) => units.titled(name, unit))]);
     for (const [title, textOf] of MEASURES) {
       table.tBodies[0].insertRow().append(cell(title, 'th'), ...found.map(item => cell(textOf(item))));

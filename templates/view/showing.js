@@ -60,6 +60,7 @@ const showing = {
     if (isOn) {
       this.before = dataset.theme;
       player.pause();
+      if (!byId('tab-measures').hidden) measures.show();
       dataset.theme = 'light';
     } else if (this.before) dataset.theme = this.before;
     else delete dataset.theme;

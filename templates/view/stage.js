@@ -13,6 +13,7 @@
    stage.forget()        the motion is another one */
 
 const NEAR = 16;  // pixels within which a point is meant, twice that with a finger
+const ORIGIN = 'origin of the body';
 const PLACES = 1000;  // points of a traced path
 const DOTS = 24;  // equal times that are marked on it
 const APART = 10;  // pixels between them, on the mean
@@ -127,7 +128,7 @@ class Stage {
       });
     }
     for (const point of shown) {
-      if (point.kind === 'origin of the body') continue;
+      if (point.kind === ORIGIN) continue;
       const [x, y] = this.view.toScreen(this.where(point, state));
       if (taken.some(([a, b]) => Math.abs(a - x) < 60 && Math.abs(b - y) < this.type)) continue;
       taken.push([x, y]);
@@ -202,7 +203,7 @@ class Stage {
   together(point, state) {
     const at = this.where(point, state), least = player.data.drawing.size / 100, found = new Map();
     for (const other of [point, ...this.points, ...this.places]) {
-      const isOrigin = other.kind === 'origin of the body' && other !== point;
+      const isOrigin = other.kind === ORIGIN && other !== point;
       if (isOrigin && other.frame.index !== point.frame.index) continue;
       if (distanceBetween(at, this.where(other, state)) < least && !found.has(other.name)) found.set(other.name, other);
     }
@@ -372,7 +373,7 @@ function pointsOf(drawing) {
   }));
   const isBearing = joint => !joint.kind.endsWith('driver');
   const origins = drawing.bodies.map((name, body) => ({
-    name, kind: 'origin of the body', frame: drawing.frames[body], point: [0, 0],
+    name, kind: ORIGIN, frame: drawing.frames[body], point: [0, 0],
   }));
   // Of several at one place a joint comes first: it is the one that is met by the pointer.
   return [...named, ...joints.filter(isBearing), ...joints.filter(joint => !isBearing(joint)), ...origins];

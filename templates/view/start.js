@@ -148,14 +148,16 @@ function connectKeys() {
 
 /* ---- paths and tabs ---- */
 
-/* Where the model names no point, the longest path is traced from the start: of bodies that are not hung on the ground, where there
-   are such, since the others go in circles. */
+/* Where the model names no point, the longest path is traced from the start: not of a body that is hung on the ground, nor of a pin
+   of one, where there are others, since these go in circles. */
 function traceLongest() {
   if (stage.traced.size) return;
   const pins = player.data.drawing.marks.filter(mark => mark.kind === 'pin' || mark.style === 'gap');
   const hung = new Set(pins.filter(pin => isGround(pin.first.frame)).map(pin => pin.second.frame.index));
-  const free = stage.points.filter(point => !hung.has(point.frame.index));
-  const candidates = free.length ? free : stage.points;
+  const circling = new Set(pins.filter(({ first, second }) => hung.has(first.frame.index) || hung.has(second.frame.index)).map(({ joint }) => joint));
+  const free = stage.points.filter(({ frame, name }) => !hung.has(frame.index) && !circling.has(name));
+  const joints = free.filter(({ kind }) => kind !== ORIGIN);
+  const candidates = [joints, free, stage.points].find(list => list.length) ?? [];
   const length = point => {
     const path = pathOf(point).line.filter(place => place !== null);
     return path.reduce((sum, place, k) => (k ? sum + distanceBetween(path[k - 1], place) : 0), 0);

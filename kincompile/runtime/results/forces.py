@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import HALF, RANK, SAME, TINY, probe_of
+from kincompile.criteria import HALF, NOISE, RANK, SAME, TINY, probe_of
 from kincompile.errors import InputError, SingularConfigurationWarning
 from kincompile.html import Tabled
 from kincompile.names import column_name, listed, multiplier, unknown
@@ -441,7 +441,8 @@ class ForceMeasures(Tabled):
         rows: list[tuple[str, ...]] = []
         for item in self.items:
             at = item.t_greatest if item.peak == abs(item.greatest) else item.t_least
-            numbers = (f"{x:.6g}" for x in (item.peak, at, item.rms, item.mean))
+            mean = item.mean if abs(item.mean) > NOISE * item.peak else 0.0
+            numbers = (f"{x:.6g}" for x in (item.peak, at, item.rms, mean))
             rows.append((item.name, *numbers, item.unit))
         return rows
 

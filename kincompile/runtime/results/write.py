@@ -71,14 +71,18 @@ def require_known_suffix(path: str | os.PathLike[str]) -> None:
 
 
 def _csv(solution: Solution, angle_unit: str) -> str:
-    """Return the table; every number has as many digits as it takes to read it back exactly."""
+    """Return the table; every number has as many digits as it takes to read it back exactly.
+
+    A zero has no sign.
+    """
     axes = solution.variants if solution.q.ndim > 2 else {}
     columns = [item.shown(angle_unit) for item in solution.columns()]
     titles = [titled(name, solution.units.get(name, "")) for name in axes]
     titles += [titled("t", TIME_UNIT), *(item.title for item in columns), "status", "residual"]
     count, points = solution.status.size, solution.t.size
     before = [*(np.repeat(axis, points) for axis in axes.values()), np.resize(solution.t, count)]
-    numbers = np.column_stack([*before, *(item.values.ravel() for item in columns)]).tolist()
+    cells = np.column_stack([*before, *(item.values.ravel() for item in columns)])
+    numbers = (cells + 0.0).tolist()
     ends = zip(solution.status.ravel().tolist(), solution.residual.ravel().tolist(), strict=True)
     lines = [",".join(titles)]
     for row, (status, residual) in zip(numbers, ends, strict=True):

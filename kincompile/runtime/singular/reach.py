@@ -164,6 +164,8 @@ def _sentence(name: str, form: Measure, least: float, most: float) -> str:
         miss = least if least > 0 else -most
         end = "less than the least" if least > 0 else "more than the most"
         text = f"{name} asks for {form.text(miss)} {end} that it can have"
+        if form.unit != "rad":  # its zero is not known here
+            text += "; a way counts from the point of its guide"
     else:
         ends = (("at least", least), ("at most", most))
         limits = [f"{form.text(form.value(end))} {word}" for word, end in ends if np.isfinite(end)]
