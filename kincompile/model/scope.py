@@ -121,8 +121,8 @@ def checked_expression(
         value = as_expression(given)
     except NotAnExpressionError as error:
         expected = "give a finite number or a SymPy expression"
-        if isinstance(given, str):
-            expected += ", as 2*kc.pi*kc.t; text is for model files"
+        if isinstance(given, str) and "*" in given:
+            expected += ", as 2*kc.pi*kc.t; formulas as text are for model files"
         scope.problems.append(f"{where}: {error}; {expected}")
         return None
     if not isinstance(value, sympy.Expr):

@@ -371,6 +371,10 @@ def test_that_paper_is_light_and_has_no_buttons(open_page: Any) -> None:
     for place in ("#play", "#tools", "#tabs", "#theme"):
         assert page.locator(place).is_hidden()
     assert page.locator("#canvas").is_visible()
+    for k, value in enumerate(page.evaluate("player.data.parameters.map(({ value }) => value)")):
+        box = page.locator(".sliders input[type=number]").nth(k)
+        assert (box.is_visible(), float(box.input_value())) == (True, value)
+    assert page.locator("#panel-measures td").first.is_visible()
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     page.emulate_media(media="screen")
     assert page.evaluate("stage.palette.isDark") is True
@@ -393,7 +397,6 @@ def test_that_nothing_that_was_computed_outlives_a_motion(open_page: Any) -> Non
     m = slider_crank()
     page = open_page(m)
     page.get_by_label("What is plotted").first.select_option("path of B")
-    page.evaluate("stage.toggleTrace(stage.points.find(point => point.name === 'B'))")
     # Twice the lengths of everything, as another set of parameters would give.
     page.evaluate("""(() => {
       for (const name of ['q', 'q_dot', 'q_ddot']) {
@@ -410,4 +413,29 @@ def test_that_nothing_that_was_computed_outlives_a_motion(open_page: Any) -> Non
     np.testing.assert_allclose(line, (far, 0), atol=1e-9)
     rail = page.evaluate("player.data.drawing.marks.find(mark => mark.kind === 'rail').reach")
     assert rail[1] == pytest.approx(2 * 4 + 3 * page.evaluate("player.data.drawing.size"), rel=1e-3)
+    page.close()
+
+
+def test_that_a_page_opens_on_the_slider_and_says_that_it_is_assembled_the_other_way(
+    open_page: Any,
+) -> None:
+    """The crank's pin goes in a circle; B, drawn left of A C, comes out right of it."""
+    page = open_page(slider_crank())
+    assert page.evaluate("[...stage.traced].map(({ name }) => name)") == ["B"]
+    assert page.locator("#message").is_hidden()
+    page.close()
+    s = kc.Sketch("mirrored", length_unit="mm", end=1.0, points=7)
+    s.ground(O=(0, 0), C=(100, 0))
+    s.joints(A=(44, 42), B=(174, -31))
+    s.link("crank", "O A", s.length("r", 50))
+    s.link("coupler", "A B", 125)
+    s.link("rocker", "C B", 125)
+    s.drive("crank", 2 * kc.pi * kc.t)
+    page = open_page(s.mechanism())
+    said = "(B is drawn left of the line A C, and found right of it)"
+    assert said in page.locator("#message").inner_text()
+    page.evaluate("live.set({ r: 51 })")
+    page.wait_for_function("live.isChanged")
+    assert page.locator("#message").is_hidden()
+    assert page.locator("#live output").inner_text().count("is on another branch") == 1
     page.close()

@@ -98,7 +98,9 @@ def test_fit_of_a_file_is_written_as_a_model_and_a_page(kincompile, file, tmp_pa
     motion = kc.solve(kc.compile(kc.read(written)), [0.1, 0.25])
     np.testing.assert_allclose(motion["ram.x"], [0.39, 0.33], atol=1e-9)
     assert done.stderr.splitlines() == [f"Wrote {written}", f"Wrote {page}"]
-    assert "<iframe srcdoc" in page.read_text(encoding="utf-8")
+    html = page.read_text(encoding="utf-8")
+    assert "<iframe srcdoc" in html
+    assert "x_ram [m] over time, and what was wanted" in html.replace("ram.x", "x_ram")
 
 
 def test_target_that_is_not_reached_is_told_and_exits_with_3(kincompile, file, tmp_path):

@@ -333,3 +333,14 @@ def test_what_cannot_be_asked_for(kincompile, pendulum, option, text, words):
     assert done.exit_code != 0
     assert words in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_that_no_zero_has_a_sign(kincompile, tmp_path):
+    path, out = tmp_path / "four_bar.py", tmp_path / "out.csv"
+    path.write_text(FOUR_BAR.replace("{B}", "120, 120"))
+    assert kincompile("run", path, "-o", out).exit_code == 0
+    solution = kc.solve(kc.compile(kc.read_model(path)), np.linspace(0, 1, 7))
+    zeros = solution.q_dot[solution.q_dot == 0]
+    assert np.signbit(zeros).any()
+    assert "-0.0" not in re.split(r"[,\n]", out.read_text())
+    assert [float(row["phi_rocker"]) for row in rows_of(out)] == solution["phi_rocker"].tolist()

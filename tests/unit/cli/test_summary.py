@@ -5,8 +5,9 @@ import pytest
 import sympy
 
 import kincompile as kc
+from kincompile.runtime.results.forces import force_measures
 from kincompile.runtime.results.write import summary
-from kincompile.tables import counted, indented, table
+from kincompile.tables import counted, indented, pose, table
 
 NAN = float("nan")
 
@@ -83,3 +84,27 @@ def test_that_a_noun_follows_its_number():
         "0 rows",
         "2 rows",
     )
+
+
+def test_that_rounding_errors_beside_large_numbers_are_zero(kincompile, tmp_path):
+    """In a position of a message, in the mean of a force, and in that of a sweep."""
+    assert pose([3.0, 1e-20, -3.58e-63]) == "at (3, 0), angle 0 rad"
+    t = np.linspace(0, 2 * np.pi, 33)
+    force = 3e8 * np.sin(t) + 4e-8
+    assert force_measures("press", t, {"drive": (force, "N*m")}).rows()[0][4] == "0"
+    path = tmp_path / "crank.py"
+    path.write_text(CRANK, encoding="utf-8")
+    swept = "--sweep", "r=1:2:2", "--target", "numpy", "--processes", 1
+    rows = kincompile("sweep", path, *swept).stdout.splitlines()
+    assert [row.split()[-1] for row in rows if row.startswith("y_tip")] == ["0"]
+
+
+CRANK = """
+import kincompile as kc
+m = kc.Mechanism("crank", end=1.0, points=4)
+r = m.parameter("r", 1.0, unit="m")
+crank = m.body("crank")
+m.add(kc.Revolute("O", m.ground, (0, 0), crank, (0, 0)))
+m.add(kc.AbsoluteAngle("motor", crank, 2 * kc.pi * kc.t))
+m.point("tip", crank, (r, 0))
+"""
