@@ -364,7 +364,7 @@ def test_that_every_width_is_filled_and_not_exceeded(open_page: Any, name: str, 
 
 
 def test_that_paper_is_light_and_has_no_buttons(open_page: Any) -> None:
-    page = open_page("four_bar", scheme="dark")
+    page = open_page("shaper", scheme="dark")
     page.emulate_media(media="print")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert page.evaluate("stage.palette.isDark") is False
