@@ -149,17 +149,28 @@ def assembly_gallery(
     module = compile_model(system)
     positions = assemblies(module, t, p)
     times = t + np.linspace(0, system.end, system.points)
-    cards = []
-    for number, guess in enumerate(positions, 1):
+    shown = []
+    for guess in positions:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", KincompileWarning)  # each card says how it went
             solution = solve(module, times, p, guess)
         data = _moving(system, solution, guess)
         last = "the end" if solution.success else f"t = {data['arrays']['t'][-1]:g}"
-        cards.append(_card(data, f"Assembly {number}", f"moves to {last}"))
+        shown.append((data, f"moves to {last}"))
+    _in_one_frame([data for data, _ in shown])
+    cards = [_card(data, f"Assembly {k}", said) for k, (data, said) in enumerate(shown, 1)]
     title = f"Assemblies of {escape(system.name)} at t = {t:g}"
     page = _filled(title, cards, {dimension_of(system)})
     return AssemblyGallery(module, positions, page)
+
+
+def _in_one_frame(shown: Sequence[dict[str, Any]]) -> None:
+    """Let drawings side by side have one scale, and every place where it is in the others."""
+    # Of each axis the least and the greatest, in turn.
+    ends = zip(*(data["extent"] for data in shown), strict=True)
+    frame = [(max if k % 2 else min)(values) for k, values in enumerate(ends)]
+    for data in shown:
+        data["extent"] = frame
 
 
 def _moving(

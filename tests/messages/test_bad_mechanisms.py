@@ -137,6 +137,7 @@ BAD = {
         "AbsoluteAngle 'motor', angle: the value phi_crank . t depends on phi_crank; a driver is a "
         "function of t and parameters only; write a coordinate-dependent condition as an Equation",
     ),
+    "text in Python": (driver("2*pi*t"), r"'2\*pi\*t' is not a number .* as 2\*kc\.pi\*kc\.t"),
     "nobody's symbol": (driver(sympy.Symbol("omega") * t), "angle contains omega, which is not"),
     "undefined function": (driver(f(t)), "angle contains f, which is not declared"),
     "function of another": (driver(f(L)), r"angle: the function f\(L\) is not defined; give it"),

@@ -80,6 +80,11 @@ def test_that_a_page_draws_each_and_says_how_far_it_moves(model, tmp_path):
         ("Assembly 2", "moves to the end"),
     ]
     assert text.count('<div class="card">') == 2
+    # In one frame, so that a pivot of the ground stands in the same place.
+    first, second = re.findall(r'"extent":(\[.*?\])', text)
+    assert first == second
+    low, high = json.loads(first)[2:]
+    assert (low < -18, high > 18) == (True, True)
 
 
 @pytest.mark.filterwarnings("default")
