@@ -768,6 +768,9 @@ _always_inline void write_quantity(const cam_by_table_batch *batch, const quanti
         only ? q->computed_entry : NULL, only ? q->computed : q->entries, start, count, is_far);
 }
 
+// What works on one motion, and on given points.
+#ifndef _WITHOUT_ONE
+
 int cam_by_table_evaluate(const cam_by_table_batch *batch)
 {
     strip b;
@@ -832,6 +835,8 @@ void cam_by_table_solve(const cam_by_table_system *system)
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
+
+#endif
 
 // Which coordinates are angles; which are or may be; numbers of size 1/2 to 1 and either sign without
 // a pattern.
@@ -1547,6 +1552,9 @@ static int go_on(strip *b, state *at, const scales *s, double t, const double *p
     return o.status[0];
 }
 
+// Many parameter sets.
+#ifndef _WITHOUT_SETS
+
 // Let the variants that failed at a time rest at the guess, where they disturb no others.
 static void put_to_rest(const cam_by_table_variants *m, strip *b, outcome *o, size_t first,
     size_t count)
@@ -1950,6 +1958,10 @@ void cam_by_table_lead_variants(const cam_by_table_variants *m, cam_by_table_inp
     }
 }
 
+#endif
+
+#ifndef _WITHOUT_ONE
+
 // One motion, as the solver has it.
 static cam_by_table_variants one_of(const cam_by_table_motion *motion)
 {
@@ -1995,6 +2007,8 @@ int cam_by_table_go_on(cam_by_table_stepper *stepper, double t, const double *p,
         q[i] = status == CAM_BY_TABLE_CONVERGED ? from[i] : NAN;
     return status;
 }
+
+#endif
 
 // The start: who brings one's own leaves it out of the library.
 #ifndef _WITHOUT_START

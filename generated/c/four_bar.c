@@ -794,6 +794,9 @@ _always_inline void write_quantity(const four_bar_batch *batch, const quantity *
         only ? q->computed_entry : NULL, only ? q->computed : q->entries, start, count, is_far);
 }
 
+// What works on one motion, and on given points.
+#ifndef _WITHOUT_ONE
+
 int four_bar_evaluate(const four_bar_batch *batch)
 {
     strip b;
@@ -858,6 +861,8 @@ void four_bar_solve(const four_bar_system *system)
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
+
+#endif
 
 // Which coordinates are angles; which are or may be; numbers of size 1/2 to 1 and either sign without
 // a pattern.
@@ -1573,6 +1578,9 @@ static int go_on(strip *b, state *at, const scales *s, double t, const double *p
     return o.status[0];
 }
 
+// Many parameter sets.
+#ifndef _WITHOUT_SETS
+
 // Let the variants that failed at a time rest at the guess, where they disturb no others.
 static void put_to_rest(const four_bar_variants *m, strip *b, outcome *o, size_t first,
     size_t count)
@@ -1975,6 +1983,10 @@ void four_bar_lead_variants(const four_bar_variants *m, four_bar_input ends)
     }
 }
 
+#endif
+
+#ifndef _WITHOUT_ONE
+
 // One motion, as the solver has it.
 static four_bar_variants one_of(const four_bar_motion *motion)
 {
@@ -2020,6 +2032,8 @@ int four_bar_go_on(four_bar_stepper *stepper, double t, const double *p, double 
         q[i] = status == FOUR_BAR_CONVERGED ? from[i] : NAN;
     return status;
 }
+
+#endif
 
 // The start: who brings one's own leaves it out of the library.
 #ifndef _WITHOUT_START

@@ -566,6 +566,9 @@ _always_inline void write_quantity(const problem_3_5_6_batch *batch, const quant
         only ? q->computed_entry : NULL, only ? q->computed : q->entries, start, count, is_far);
 }
 
+// What works on one motion, and on given points.
+#ifndef _WITHOUT_ONE
+
 int problem_3_5_6_evaluate(const problem_3_5_6_batch *batch)
 {
     strip b;
@@ -630,6 +633,8 @@ void problem_3_5_6_solve(const problem_3_5_6_system *system)
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
+
+#endif
 
 // Which coordinates are angles; which are or may be; numbers of size 1/2 to 1 and either sign without
 // a pattern.
@@ -1344,6 +1349,9 @@ static int go_on(strip *b, state *at, const scales *s, double t, const double *p
     return o.status[0];
 }
 
+// Many parameter sets.
+#ifndef _WITHOUT_SETS
+
 // Let the variants that failed at a time rest at the guess, where they disturb no others.
 static void put_to_rest(const problem_3_5_6_variants *m, strip *b, outcome *o, size_t first,
     size_t count)
@@ -1747,6 +1755,10 @@ void problem_3_5_6_lead_variants(const problem_3_5_6_variants *m, problem_3_5_6_
     }
 }
 
+#endif
+
+#ifndef _WITHOUT_ONE
+
 // One motion, as the solver has it.
 static problem_3_5_6_variants one_of(const problem_3_5_6_motion *motion)
 {
@@ -1792,6 +1804,8 @@ int problem_3_5_6_go_on(problem_3_5_6_stepper *stepper, double t, const double *
         q[i] = status == PROBLEM_3_5_6_CONVERGED ? from[i] : NAN;
     return status;
 }
+
+#endif
 
 // The start: who brings one's own leaves it out of the library.
 #ifndef _WITHOUT_START

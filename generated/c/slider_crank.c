@@ -723,6 +723,9 @@ _always_inline void write_quantity(const slider_crank_batch *batch, const quanti
         only ? q->computed_entry : NULL, only ? q->computed : q->entries, start, count, is_far);
 }
 
+// What works on one motion, and on given points.
+#ifndef _WITHOUT_ONE
+
 int slider_crank_evaluate(const slider_crank_batch *batch)
 {
     strip b;
@@ -787,6 +790,8 @@ void slider_crank_solve(const slider_crank_system *system)
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
+
+#endif
 
 // Which coordinates are angles; which are or may be; numbers of size 1/2 to 1 and either sign without
 // a pattern.
@@ -1503,6 +1508,9 @@ static int go_on(strip *b, state *at, const scales *s, double t, const double *p
     return o.status[0];
 }
 
+// Many parameter sets.
+#ifndef _WITHOUT_SETS
+
 // Let the variants that failed at a time rest at the guess, where they disturb no others.
 static void put_to_rest(const slider_crank_variants *m, strip *b, outcome *o, size_t first,
     size_t count)
@@ -1906,6 +1914,10 @@ void slider_crank_lead_variants(const slider_crank_variants *m, slider_crank_inp
     }
 }
 
+#endif
+
+#ifndef _WITHOUT_ONE
+
 // One motion, as the solver has it.
 static slider_crank_variants one_of(const slider_crank_motion *motion)
 {
@@ -1951,6 +1963,8 @@ int slider_crank_go_on(slider_crank_stepper *stepper, double t, const double *p,
         q[i] = status == SLIDER_CRANK_CONVERGED ? from[i] : NAN;
     return status;
 }
+
+#endif
 
 // The start: who brings one's own leaves it out of the library.
 #ifndef _WITHOUT_START

@@ -2133,6 +2133,9 @@ _always_inline void write_quantity(const spatial_slider_crank_batch *batch, cons
         only ? q->computed_entry : NULL, only ? q->computed : q->entries, start, count, is_far);
 }
 
+// What works on one motion, and on given points.
+#ifndef _WITHOUT_ONE
+
 int spatial_slider_crank_evaluate(const spatial_slider_crank_batch *batch)
 {
     strip b;
@@ -2214,6 +2217,8 @@ void spatial_slider_crank_solve(const spatial_slider_crank_system *system)
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
+
+#endif
 
 // Which coordinates are angles; which are or may be; numbers of size 1/2 to 1 and either sign without
 // a pattern.
@@ -2935,6 +2940,9 @@ static int go_on(strip *b, state *at, const scales *s, double t, const double *p
     return o.status[0];
 }
 
+// Many parameter sets.
+#ifndef _WITHOUT_SETS
+
 // Let the variants that failed at a time rest at the guess, where they disturb no others.
 static void put_to_rest(const spatial_slider_crank_variants *m, strip *b, outcome *o, size_t first,
     size_t count)
@@ -3340,6 +3348,10 @@ void spatial_slider_crank_lead_variants(const spatial_slider_crank_variants *m,
     }
 }
 
+#endif
+
+#ifndef _WITHOUT_ONE
+
 // One motion, as the solver has it.
 static spatial_slider_crank_variants one_of(const spatial_slider_crank_motion *motion)
 {
@@ -3385,6 +3397,8 @@ int spatial_slider_crank_go_on(spatial_slider_crank_stepper *stepper, double t, 
         q[i] = status == SPATIAL_SLIDER_CRANK_CONVERGED ? from[i] : NAN;
     return status;
 }
+
+#endif
 
 // The start: who brings one's own leaves it out of the library.
 #ifndef _WITHOUT_START

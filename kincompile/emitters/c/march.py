@@ -47,6 +47,8 @@ PUBLIC = (
 """Functions that the header declares."""
 APART = ("weigh", "eliminate", "substitute", "direct", "descend", "mirror")
 """Functions that a compiler need not put in line: they would take it a second."""
+OF_SETS = "put_to_rest"
+"""The first function of many parameter sets: who needs none leaves it out, and all after it."""
 ON_LINES = ("position", "nu", "gamma")
 """Kernels that have others beside them for points on lines of parameters."""
 NUMBERS = {"NOTHING": "NAN", "INFINITE": "INFINITY"}
@@ -140,6 +142,8 @@ class CSolver(SolverPrinter):
         lines = super().function(item)
         if any("lane < all;" in line for line in lines):
             lines.insert(lines.index("{") + 1, "    const size_t all = _abreast(lanes);")
+        if item.name == OF_SETS:
+            lines = ["// Many parameter sets.", "#ifndef _WITHOUT_SETS", "", *lines]
         return lines
 
     # ------------------------------------------------------------ loops over lanes

@@ -47,6 +47,10 @@ FLAGS = (
 OWN = ("-D_WITHOUT_START",)
 """Flags of the runtime's libraries: it has a start of its own."""
 
+ONE, SETS = ("-D_WITHOUT_SETS",), ("-D_WITHOUT_ONE",)
+"""Flags of the two libraries of one source: what one motion and given points need, which is built
+at once, and what many parameter sets need, which is built on request."""
+
 VECTORIZED = ("-O3", "-D_WHOLE_REGISTERS", "-fno-ipa-cp-clone", "-fno-inline-functions")
 """In full, but for copies of functions that the code does not ask for: a loop over points is then
 compiled once. Without the last three gcc takes three times as long for the same speed."""
@@ -76,14 +80,16 @@ ALTERNATIVE = "or use the NumPy target, which needs no compiler: kc.compile(m)"
 REPAIR = f"repair or reinstall it, name another by the environment variable CC, {ALTERNATIVE}"
 
 
-def library(name: str, files: Mapping[str, str], fingerprint: str) -> ctypes.CDLL:
-    """Return the library of emitted C code, from the cache or newly built.
+def library(
+    name: str, files: Mapping[str, str], fingerprint: str, part: tuple[str, ...] = ONE
+) -> ctypes.CDLL:
+    """Return a library of emitted C code, ONE or SETS, from the cache or newly built.
 
     Of the files, text by name, the source comes first; the fingerprint is what the library must say
     of itself. An `UnsupportedError` says what is wrong with the compiler.
     """
     source = next(iter(files.values()))
-    command = (*_compiler(), *_level(source), *FLAGS, *OWN, *_machine_flags())
+    command = (*_compiler(), *_level(source), *FLAGS, *OWN, *part, *_machine_flags())
     digest = hashlib.sha256()
     for part in (*command, _version(command[0]), _processor(), *files, *files.values()):
         digest.update(part.encode() + b"\0")

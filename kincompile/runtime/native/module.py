@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import math
 from ctypes import byref, c_double, c_size_t, c_void_p
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from kincompile.criteria import FAR
 from kincompile.errors import InputError
 from kincompile.runtime.engine.code import ORIGIN, attach, code_of
 from kincompile.runtime.memory import empty
-from kincompile.runtime.native.library import library
+from kincompile.runtime.native.library import SETS, library
 from kincompile.runtime.native.points import (
     NUMBER,
     REAL,
@@ -62,12 +63,14 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     """Replace the functions of an emitted NumPy module by compiled ones, from what C emitted.
 
     Where the mechanism has a planned solve the module gets one more, ``compiled_march``. An
-    `UnsupportedError` says what is wrong with the compiler.
+    `UnsupportedError` says what is wrong with the compiler. What many parameter sets need is
+    built when it is first called.
     """
     code, names = code_of(module), vars(module)
     present = code.quantities
-    loaded = library(code.name, files, names["FINGERPRINT"])
-    functions = _Functions(code, names["_batch"], loaded)
+    build = partial(library, code.name, files, names["FINGERPRINT"])
+    loaded = build()
+    functions = _Functions(code, names["_batch"], loaded, cache(partial(build, SETS)))
     given = {**quantities.functions(present), **_nonzeros(present)}
     compiled = {name: functions.evaluator(name, results) for name, results in given.items()}
     compiled["kinematics_batch_last"] = functions.batch_last()
@@ -107,13 +110,26 @@ def _nonzeros(present: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
 class _Functions:
     """Makes the functions of a module from those of its library."""
 
-    def __init__(self, code: Compiled, checked: Function, loaded: ctypes.CDLL) -> None:
+    def __init__(
+        self,
+        code: Compiled,
+        checked: Function,
+        loaded: ctypes.CDLL,
+        of_sets: Callable[[], ctypes.CDLL],
+    ) -> None:
         self._code, self._checked_batch = code, checked
-        self._library, self._name = loaded, code.name
+        self._library, self._of_sets, self._name = loaded, of_sets, code.name
         self._n, self._m = len(code.coordinates), len(code.equations)
         self._shapes = _shapes(code)
         self._batch_type = batch_type(tuple(self._shapes))
         self._run = getattr(loaded, f"{self._name}_evaluate")
+
+    def _sets(self, name: str, *arguments: Any, result: Any = None) -> Function:
+        """Return a function of many parameter sets, whose library is built if need be."""
+        run: Any = getattr(self._of_sets(), f"{self._name}_{name}_variants")
+        run.argtypes, run.restype = (c_void_p, *arguments), result
+        found: Function = run
+        return found
 
     def evaluator(self, name: str, results: tuple[str, ...]) -> Function:
         """Return a function of points (..., n) that gives some results."""
@@ -304,11 +320,8 @@ class _Functions:
 
     def march(self) -> Function:
         """Return the march over a time grid."""
-        one, many = (
-            getattr(self._library, f"{self._name}_{name}") for name in ("march", "follow_variants")
-        )
-        one.restype = many.restype = c_size_t
-        many.argtypes = c_void_p, c_double
+        one = getattr(self._library, f"{self._name}_march")
+        one.restype = c_size_t
 
         def march(
             inputs: Inputs,
@@ -343,14 +356,14 @@ class _Functions:
             motion.q, motion.q_dot, motion.q_ddot = map(numbers_of_batch, first)
             said = (residual, status, iterations)
             motion.residual, motion.status, motion.iterations = (x.ctypes.data for x in said)
-            return int(one(byref(motion)) if sets is None else many(byref(motion), FAR))
+            if sets is None:
+                return int(one(byref(motion)))
+            return int(self._sets("follow", c_double, result=c_size_t)(byref(motion), FAR))
 
         return march
 
     def attempts(self) -> Function:
         """Return safeguarded attempts of many parameter sets."""
-        run = getattr(self._library, f"{self._name}_attempt_variants")
-        run.restype = None
 
         def attempts(
             sets: Array, t: float, q: Array, size: float, max_iterations: int
@@ -363,7 +376,7 @@ class _Functions:
             motion = _variants(np.array([t]), sets, q)
             motion.size, motion.max_iterations = size, max_iterations
             motion.q, motion.status = numbers_of_batch(q), status.ctypes.data
-            run(byref(motion))
+            self._sets("attempt")(byref(motion))
             found: NDArray[np.bool_] = status == Status.CONVERGED
             return found
 
@@ -371,8 +384,6 @@ class _Functions:
 
     def mirror(self) -> Function:
         """Return what goes beyond the nearest singular positions of many parameter sets."""
-        run = getattr(self._library, f"{self._name}_mirror_variants")
-        run.restype, run.argtypes = None, (c_void_p, c_void_p)
 
         def mirror(sets: Array, t: float, q: Array, size: float, magnitude: Array) -> Array:
             """Return about where sets (B, k) can be assembled there, (n, B), of positions (n, B).
@@ -382,7 +393,7 @@ class _Functions:
             found = np.empty_like(q, order="C")
             motion = _variants(np.array([t]), sets, q)
             motion.size, motion.q = size, numbers_of_batch(found)
-            run(byref(motion), magnitude.ctypes.data)
+            self._sets("mirror", c_void_p)(byref(motion), magnitude.ctypes.data)
             found[:, ~np.isfinite(found).all(axis=0)] = np.nan
             return found
 
@@ -390,8 +401,6 @@ class _Functions:
 
     def lead(self) -> Function:
         """Return what leads a position along lines of parameters."""
-        run = getattr(self._library, f"{self._name}_lead_variants")
-        run.restype, run.argtypes = None, (c_void_p, Numbers)
 
         def lead(
             p: Array, t: float, guess: Array, sets: Array, size: float, tolerance: float, most: int
@@ -407,7 +416,7 @@ class _Functions:
             motion.q, motion.q_dot, motion.q_ddot = map(numbers_of_batch, found)
             said = (residual, status, iterations)
             motion.residual, motion.status, motion.iterations = (x.ctypes.data for x in said)
-            run(byref(motion), numbers_of_batch(sets.T))
+            self._sets("lead", Numbers)(byref(motion), numbers_of_batch(sets.T))
             return found[0], status
 
         return lead

@@ -442,3 +442,54 @@ def test_that_a_slow_compiler_is_mentioned_once_while_it_runs(compiler, monkeypa
     (line,) = terminal.getvalue().splitlines()
     assert line.startswith("Compiling slow.c by ")
     assert line.endswith("fake-cc ...")
+
+
+# ---------------------------------------------------------------- many parameter sets
+
+TWO_LENGTHS = {"length": [1.0, 2.0]}
+
+
+def rod() -> kc.Mechanism:
+    """Return a tiny mechanism with a parameter."""
+    m = kc.Mechanism("rod")
+    rod, length = m.body("rod"), m.parameter("length", 1.0)
+    m.add(kc.Revolute("A", m.ground, (0, 0), rod, (length, 0)))
+    m.add(kc.AbsoluteAngle("motor", rod, kc.t))
+    return m
+
+
+def test_that_what_many_sets_need_is_compiled_on_request(compiler, cache, tmp_path):
+    """One motion, steps and points leave it out; the second library leaves these out."""
+    compiler(f'echo x >> {tmp_path}/calls; exec REAL "$@"')
+    module = kc.compile(rod(), target="c")
+    assert kc.solve(module, [0.0, 0.1]).success
+    kc.stepper(module)(0.1)
+    assert (tmp_path / "calls").read_text() == "x\n"
+    (first,) = cache.glob("*.so")
+    for _ in range(2):
+        solution = kc.solve(module, [0.0, 0.1], TWO_LENGTHS)
+        np.testing.assert_allclose(solution["x_rod"][:, 0], [-1.0, -2.0])
+    assert (tmp_path / "calls").read_text() == "x\n" * 2
+    (second,) = set(cache.glob("*.so")) - {first}
+    of_one = ("evaluate", "solve", "march", "set_out", "go_on", "stepper_size")
+    of_sets = [f"{x}_variants" for x in ("march", "follow", "attempt", "mirror", "lead")]
+    for path, present, absent in ((first, of_one, of_sets), (second, of_sets, of_one)):
+        library = ctypes.CDLL(str(path))
+        assert all(hasattr(library, f"rod_{x}") for x in present)
+        assert not any(hasattr(library, f"rod_{x}") for x in absent)
+    assert_intact(cache, 2)
+
+
+def test_a_compiler_that_is_missing_when_sets_come_is_named(monkeypatch, compiler, cache):
+    """What one motion needs goes on, and so do sets once there is a compiler again."""
+    module = kc.compile(rod(), target="c")
+    with monkeypatch.context() as patch:
+        patch.setenv("CC", "no-such-compiler")
+        with pytest.raises(kc.UnsupportedError, match="no-such-compiler, which CC names, is not"):
+            kc.solve(module, [0.0, 0.1], TWO_LENGTHS)
+    compiler('echo "out of luck" >&2; exit 4')
+    with pytest.raises(kc.UnsupportedError, match=r"exit code 4(?s:.*)out of luck"):
+        kc.solve(module, [0.0, 0.1], TWO_LENGTHS)
+    assert kc.solve(module, [0.0, 0.1]).success
+    compiler('exec REAL "$@"')
+    assert kc.solve(module, [0.0, 0.1], TWO_LENGTHS).success
