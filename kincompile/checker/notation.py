@@ -11,11 +11,19 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from keyword import iskeyword
+from typing import TYPE_CHECKING
 
 import numpy as np
 import sympy
 
+from kincompile.files.formula_text import Source
+from kincompile.files.safe_expressions import FUNCTIONS
+from kincompile.files.text_places import TextPlace
 from kincompile.model.expressions import NotAnExpressionError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
 
 IMAGINARY = sympy.Symbol("imaginary unit")
 """Stands for the imaginary unit until the real part is taken; no name of a model has a blank."""
@@ -35,6 +43,11 @@ _BARE = re.compile(rf"(?<![A-Za-z])({_FUNCTION})\s*({_NAME})(?!\w|\()")
 _FONTS = re.compile(r"\\(?:mathbf|mathrm|boldsymbol|bm|text|operatorname)\s*\{(\\?\w+)\}")
 _NO_INK = re.compile(r"\\(?:left|right|big|Big|[,;:! ]|quad|displaystyle)(?![a-zA-Z])")
 _FACTORS = re.compile(r"(?<=[\w)])[ \t]+(?=[A-Za-z0-9(])|(?<=\))(?=[\w(])")
+_TOKEN = re.compile(r"(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][+-]?\d+(?!\w))?|[A-Za-z_]\w*|\*\*|\S")
+_VALUE = re.compile(r"[\w.)]")
+_THOUSANDS = re.compile(r"[1-9]\d{0,2},\d{3}")
+IN_DEGREES = ("sind", "cosd", "tand")
+"""Functions of an angle in degrees, which no formula here has."""
 MOST = 20_000
 """Characters of a text that is rewritten."""
 
@@ -47,6 +60,86 @@ def plain(text: str) -> str:
     text = _DEGREES.sub(r"(\1*pi/180)", text.translate(_SIGNS))
     text = _without_greek(text)
     return _without_latex(text) if "\\" in text or "{" in text else text
+
+
+def explicit(text: str, place: TextPlace | None, names: Collection[str]) -> str:
+    """Return one formula with its products written out, and its decimal commas as points.
+
+    ``5.2sin(phi)``, ``4.5 phi_dot^2 Cos(phi)`` and ``2(x + y)(x - y)`` are products; ``a(b)`` stays
+    as it is: a name that is no function is refused there.
+
+    Raises
+    ------
+    ExpressionError
+        If a product or a comma can be read in two ways, or a function takes degrees.
+    """
+    if len(text) > MOST:
+        return text
+    source, before, end = Source(text, place or TextPlace()), "", 0
+    parts: list[str] = []
+    divided = [False]  # in each open bracket, whether a / stands in the term
+    takes_two = [False]  # whether a comma separates arguments there
+    for found in _TOKEN.finditer(text):
+        token, at = found[0], found.start()
+        if token[0].isdigit() and "," in token:
+            token = _decimal(token, takes_two[-1], source, at)
+        elif token.lower() in IN_DEGREES and token not in names:
+            raise source.error(
+                f"{token} takes degrees; angles are in radians here: write {token[:-1].lower()}", at
+            )
+        elif token not in names and token not in FUNCTIONS and token.lower() in FUNCTIONS:
+            token = token.lower()
+        gap = text[end:at]
+        if _is_product(before, token, gap):
+            if divided[-1]:
+                raise source.error(
+                    "a quotient before a product without a sign can be read in two ways; write "
+                    "(a/b)*c or a/(b*c)",
+                    at,
+                )
+            gap = f"*{gap[1:]}"
+        if token in "([":
+            calls = before if before in FUNCTIONS or before == "Piecewise" else ""
+            takes_two.append(before == "Piecewise" or (
+                FUNCTIONS[calls][2] > 1 if calls else before[:1].isalpha() or takes_two[-1]
+            ))  # fmt: skip
+            divided.append(False)
+        elif token in ")]" and len(divided) > 1:
+            takes_two.pop()
+            divided.pop()
+        elif token.endswith((*"+-,<>=",)) and before not in ("", "^", "**", "*", "/"):
+            divided[-1] = False
+        elif token == "/":
+            divided[-1] = True
+        parts += [gap, token]
+        before, end = token, found.end()
+    return "".join([*parts, text[end:]])
+
+
+def _is_product(before: str, token: str, gap: str) -> bool:
+    """Return whether two parts of a formula that follow each other are factors."""
+    if before in ("", ".") or not _VALUE.match(before[-1]) or iskeyword(before) or iskeyword(token):
+        return False
+    if before[0].isalpha() or before[0] == "_":
+        # A name before a bracket is a call, and refused unless it is a function.
+        return before not in FUNCTIONS and gap != "" and token[0].isalpha()
+    if before == ")":
+        return token == "(" or token[0].isalpha()
+    if before == "0" and not gap and token[0] in "xXoObB":
+        return False  # a number in another base, which is refused
+    return token == "(" or token[0].isalpha()
+
+
+def _decimal(token: str, takes_two: bool, source: Source, at: int) -> str:
+    """Return a number with a comma as one with a point, where that is what it means."""
+    if takes_two or token.endswith(","):
+        return token
+    if _THOUSANDS.fullmatch(token):
+        whole, part = token.split(",")
+        raise source.error(
+            f"{token} can be read in two ways; write {whole}.{part} or {whole}{part}", at
+        )
+    return token.replace(",", ".")
 
 
 def _without_greek(text: str) -> str:
@@ -78,7 +171,8 @@ def _without_latex(text: str) -> str:
     text = re.sub(r"\\(?!d{1,2}ot\b|[dt]?frac\b)([A-Za-z]+)", r"\1", text)
     text = re.sub(r"\bvar(phi|theta)", r"\1", text)
     text = _DOT.sub(lambda found: f"{found[2] or found[3]}{found[4]}_{found[1]}", text)
-    text = re.sub(r"_\{(\w+)\}", r"_\1", text)
+    # SymPy prints phi_crank_dot as \phi_{crank dot}.
+    text = re.sub(r"_\{(\w+(?: \w+)*)\}", lambda found: f"_{found[1].replace(' ', '_')}", text)
     while found := _FRACTION.search(text):
         above, middle = _argument(text, found.end())
         below, end = _argument(text, middle)

@@ -89,6 +89,12 @@ class Report(Shown):
         ]
         return f"{self.title}: {len(self.entries)} entries compared, {', '.join(counts)}."
 
+    @property
+    def accepted(self) -> str:
+        """How many entries are accepted, as a sentence."""
+        count = sum(entry.accepted for entry in self.entries)
+        return f"Accepted: {count} of {len(self.entries)} entries."
+
     def rows(self, quantity: str) -> dict[str, list[ComparedEntry]]:
         """Return the entries of a quantity by equation."""
         rows: dict[str, list[ComparedEntry]] = {}
@@ -163,7 +169,7 @@ class Report(Shown):
 
     @property
     def _closing(self) -> str:
-        return f"Verdict: {self.verdict.value}."
+        return f"{self.accepted}\nVerdict: {self.verdict.value}."
 
     def to_rich(self, reveal: bool = False) -> Group:
         """Return the report as a table in colours, for ``rich.print``."""
@@ -188,7 +194,7 @@ class Report(Shown):
             counts,
             *(Text(item.text, style=COLOURS[Verdict.CONVENTION]) for item in self.conventions),
             *([details] if details.row_count else []),
-            Text(self._closing, style=COLOURS[self.verdict]),
+            Text(self._closing, style=COLOURS[Verdict.EQUAL if self.equal else self.verdict]),
         )
 
     def to_gradescope(self, reveal: bool = False) -> str:

@@ -15,7 +15,7 @@ import sympy
 from kincompile.checker import rounding
 from kincompile.checker.agreement import Given
 from kincompile.checker.matrix_text import Cell, split_matrix
-from kincompile.checker.notation import IMAGINARY, plain, real
+from kincompile.checker.notation import IMAGINARY, explicit, plain, real
 from kincompile.checker.reference import MATRICES
 from kincompile.errors import InputError, SingularConfigurationWarning
 from kincompile.files.data_text import MAX_PROBLEMS
@@ -103,7 +103,8 @@ class _Formulas:
                     "aliases written out; write them shorter"
                 )
             self._size += len(text)
-            self._read[text] = real(parse_expression(text, words.names, place, words.refused))
+            typed = explicit(text, place, words.names)
+            self._read[text] = real(parse_expression(typed, words.names, place, words.refused))
             self._size += extent(self._read[text])[0]
         return self._read[text]
 

@@ -12,15 +12,22 @@ from kincompile.writing import require_writable
 @click.command("mark")
 @click.argument("folder")
 @output_option("File to write, .csv; without it, the table goes to stdout.", required=False)
-def command(folder: str, output: str | None) -> None:
+@click.option(
+    "--tolerance",
+    type=float,
+    default=0.0,
+    metavar="R",
+    help="Relative error up to which a rounded number counts, at most 0.1; else 0.",
+)
+def command(folder: str, output: str | None, tolerance: float) -> None:
     """Mark the hand-in files in FOLDER, which `kincompile exercise` wrote.
 
-    The table has a line for each student: points, those of each blank, and the reasons. Formulas
-    are parsed, never run.
+    The table has a line for each student: points, those of each blank, the reasons, and apart
+    from them what cannot be read. Formulas are parsed, never run.
     """
     if output is not None:
         require_writable(output)
-    marks = kc.mark(folder)
+    marks = kc.mark(folder, tolerance=tolerance)
     if output is None:
         print_data(marks.to_csv())
     else:

@@ -124,7 +124,9 @@ class ExerciseKit:
             entry = f"{system.equations[0]}, {system.coordinates[0].name}"
             lines += [f"#   P1 = {entry}", f"#   B1 = -0.25*{turned}"]
         else:
-            lines.append(f"#   B1 = -0.25*{turned}*{rate(last)}**2")
+            forms = {"Phi_q": f"-0.25*{turned}", "gamma": f"-0.25*{turned}*{rate(last)}^2"}
+            first = {item.quantity: item.name for item in reversed(blanks)}
+            lines += [f"#   {first[x]} = {form}" for x, form in forms.items() if x in first]
         lines += ["# Lines with # are comments. An empty blank has no points.", ""]
         for item in blanks:
             question = item.label(system)

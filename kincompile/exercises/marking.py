@@ -16,6 +16,8 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+import sympy
+
 from kincompile.checker.compare import compare
 from kincompile.checker.reference import Reference
 from kincompile.errors import InputError, InternalError, KincompileError
@@ -47,6 +49,12 @@ _ENTRY = re.compile(r"(?:Phi_q\s*)?\[?\s*([^,\[\]]+?)\s*,\s*([^,\[\]]+?)\s*\]?",
 """An entry as it is named: ``A.x, phi_crank`` or ``Phi_q[A.x, crank.phi]``."""
 _PLACE = re.compile(r"\w+, row \d+, column \d+: (line 1, )?")
 """Where a formula stands in a matrix, which no student has seen."""
+_LISTED = re.compile(r"(?<=functions): sin, .*|; the functions are: .*", re.DOTALL)
+"""All functions by name, too long for a cell."""
+_LITERAL = re.compile(r"(?<![\w.,^])(?<!\*\*)\d+(?:[.,]\d+)?(?![\w.,]*[eE][+-]?\d)(?![\d_])")
+"""A number that is no exponent, and has none."""
+MOST_TOLERANCE = 0.1
+"""Largest relative error of a rounded number that may be asked for."""
 
 RIGHT, EMPTY = "right", "not filled"
 
@@ -63,11 +71,14 @@ class Mark:
         1 where it is right, else 0.
     reason
         ``"right"``, ``"not filled"``, or what is wrong, without the right formula.
+    is_read
+        Whether the answer could be read; one that could not is no wrong answer.
     """
 
     blank: Blank
     points: int
     reason: str
+    is_read: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,17 +97,21 @@ class Marks:
     students: Mapping[str, tuple[Mark, ...]]
 
     def to_csv(self) -> str:
-        """Return a table: a line a student, with points, those of each blank, and reasons."""
+        """Return a table: a line a student, with points, those of each blank, and reasons.
+
+        A blank that cannot be read has ``?``, and its reason stands in a column of its own.
+        """
         blanks = next(iter(self.students.values()))
         rows = StringIO()
         table = csv.writer(rows, lineterminator="\n")
         names = [item.blank.name for item in blanks]
-        table.writerow(["student", "points", "of", *names, "reasons"])
+        table.writerow(["student", "points", "of", *names, "reasons", "not read"])
         for student, marks in self.students.items():
-            points = [item.points for item in marks]
-            lost = (item for item in marks if item.reason != RIGHT)
-            reasons = "; ".join(f"{item.blank.name}: {item.reason}" for item in lost)
-            table.writerow([_cell(student), sum(points), len(points), *points, _cell(reasons)])
+            points = [item.points if item.is_read else "?" for item in marks]
+            table.writerow([
+                _cell(student), sum(item.points for item in marks), len(marks), *points,
+                *(_cell(_reasons(marks, is_read)) for is_read in (True, False)),
+            ])  # fmt: skip
         return rows.getvalue()
 
     def write(self, path: str | os.PathLike[str]) -> Path:
@@ -104,38 +119,92 @@ class Marks:
         return write_atomically(path, self.to_csv())
 
 
+def _reasons(marks: Sequence[Mark], is_read: bool) -> str:
+    """Return why points are lost, each reason once after the names of its blanks."""
+    blanks: dict[str, list[str]] = {}
+    for item in marks:
+        if item.reason != RIGHT and item.is_read is is_read:
+            blanks.setdefault(item.reason, []).append(item.blank.name)
+    return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in blanks.items())
+
+
 def _cell(text: str) -> str:
     """Return a text that no spreadsheet takes for a formula."""
     return f"'{text}" if text.startswith(("=", "+", "-", "@")) else text
 
 
-def mark(folder: str | os.PathLike[str]) -> Marks:
+def mark(folder: str | os.PathLike[str], *, tolerance: float = 0.0) -> Marks:
     """Mark the hand-in files of an exercise that `exercise` wrote.
 
     An entry is right if it is equal to the derived one at random states, however it is written; of
     gamma, if it is equal wherever the constraints hold. Formulas are parsed, never run.
 
+    Parameters
+    ----------
+    folder
+        What `exercise` wrote, with the hand-in files filled.
+    tolerance
+        How much a number that was rounded may differ, relative to itself: with 0.01 the entry
+        counts where 3.2 stands for 3.1875. With 0 it does not, and the reason names the number.
+
     Raises
     ------
     InputError
-        If the folder is no exercise.
+        If the folder is no exercise, or the tolerance is not from 0 to 0.1.
     """
+    if not 0 <= tolerance <= MOST_TOLERANCE:
+        raise InputError(f"tolerance is {tolerance}; give one from 0 to {MOST_TOLERANCE}")
     target = Path(folder)
     key = _key(target)
     found: dict[str, tuple[Mark, ...]] = {}
     for student, blanks in key.items():
         lines, problem = _lines(target / STUDENTS / student / HAND_IN)
         answers, unread = _answers(lines)
-        marks = {item: Mark(item, 0, problem or unread.get(item.name, EMPTY)) for item in blanks}
+        marks = {
+            item: Mark(item, 0, problem or unread.get(item.name, EMPTY), item.name not in unread)
+            for item in blanks
+        }
         if answers:
             path = target / INSTRUCTOR / MODELS / f"{student}.toml"
-            marks |= within_budget(partial(_student, path, blanks, answers), blanks)
+            marks |= within_budget(partial(_student, path, blanks, answers, tolerance), blanks)
         found[student] = tuple(marks.values())
     return Marks(target, found)
 
 
-def _student(path: Path, blanks: Sequence[Blank], answers: Mapping[str, str]) -> dict[Blank, Mark]:
-    return _marked(Reference(read(path).system()), blanks, answers)
+def _student(
+    path: Path, blanks: Sequence[Blank], answers: Mapping[str, str], tolerance: float
+) -> dict[Blank, Mark]:
+    reference = Reference(read(path).system())
+    marks = _marked(reference, blanks, answers)
+    for item, found in marks.items():
+        if not found.points and found.is_read and item.quantity != PLACE:
+            marks[item] = _rounding(reference, found, answers[item.name], tolerance)
+    return marks
+
+
+def _rounding(reference: Reference, found: Mark, answer: str, tolerance: float) -> Mark:
+    """Return the mark of a wrong entry, which may be right but for numbers that were rounded."""
+    system, blank = reference.system, found.blank
+    right = blank.answer(system.Phi_q, system.gamma)
+    numbers = {abs(float(item)) for item in right.atoms(sympy.Number)}
+    rounded: dict[str, float] = {}
+
+    def unrounded(token: re.Match[str]) -> str:
+        text = token[0].replace(",", ".")
+        part = 0.5 * 10.0 ** -len(text.partition(".")[2]) * (1 + 1e-9)
+        near = [x for x in numbers if abs(float(text) - x) <= part]
+        if len(near) != 1 or float(text) in numbers:
+            return token[0]
+        rounded[text] = near[0]
+        return repr(near[0])
+
+    exact = _LITERAL.sub(unrounded, answer)
+    if not rounded or not _alone(reference, blank, {blank.name: exact})[blank].points:
+        return found
+    if all(abs(float(text) - x) <= tolerance * x for text, x in rounded.items()):
+        return Mark(blank, 1, RIGHT)
+    numbers_rounded = " and ".join(f"{x:g} was rounded to {text}" for text, x in rounded.items())
+    return Mark(blank, 0, f"{numbers_rounded}; else the entry is right")
 
 
 def within_budget(
@@ -202,7 +271,7 @@ def _work_and_tell(work: Callable[[], dict[Blank, Mark]], writer: int) -> NoRetu
 def _outcome(work: Callable[[], dict[Blank, Mark]]) -> tuple[str, Any]:
     """Return how a student's work ended, in a word, and its marks or what is wrong."""
     try:
-        rows = [(item.blank.name, item.points, item.reason) for item in work().values()]
+        rows = [(x.blank.name, x.points, x.reason, x.is_read) for x in work().values()]
     except MemoryError:
         raise
     except RecursionError:
@@ -309,7 +378,9 @@ def _alone(reference: Reference, blank: Blank, answers: Mapping[str, str]) -> di
     try:
         return _compared(reference, [blank], answers)
     except KincompileError as error:
-        return {blank: Mark(blank, 0, _short(f"cannot be read: {_PLACE.sub('', str(error))}"))}
+        why = _LISTED.sub("", _PLACE.sub("", str(error)))
+        text = f"cannot be read: {answers[blank.name]} ({why})"
+        return {blank: Mark(blank, 0, _short(text), is_read=False)}
 
 
 def _compared(
