@@ -88,7 +88,8 @@ def _paths(found: Fit, motion: Solution) -> Iterator[str]:
         times = [t for name, t in wanted if name == names[0] and (names[1], t) in wanted]
         if not times:
             continue
-        dots = (np.array([wanted[name, t].wanted for t in times]) for name in names)
-        layers = Layer("line", *(motion[name] for name in names)), Layer("dots", *dots, **WANTED)
-        labels = (titled(name, motion.units.get(name, "")) for name in names)
-        yield plot_svg(f"Path of {point}, and what was wanted", *labels, layers, is_true=True)
+        x, y = (np.array([wanted[name, t].wanted for t in times]) for name in names)
+        path = Layer("line", motion[names[0]], motion[names[1]])
+        layers = path, Layer("dots", x, y, **WANTED)
+        across, up = (titled(name, motion.units.get(name, "")) for name in names)
+        yield plot_svg(f"Path of {point}, and what was wanted", across, up, layers, is_true=True)

@@ -111,8 +111,8 @@ def _axes(
         yield label(text, x=at, y=HEIGHT - 24, text_anchor="middle", fill="var(--quiet)")
     for y, text in _ticks(y0, y1):
         yield element("path", d=outline([(x0, y), (x1, y)], False, pair), stroke="var(--line)")
-        at = float(pair((x0, y)).split()[1]) + 4
-        yield label(text, x=LEFT - 6, y=f"{at:.1f}", text_anchor="end", fill="var(--quiet)")
+        height = float(pair((x0, y)).split()[1]) + 4
+        yield label(text, x=LEFT - 6, y=f"{height:.1f}", text_anchor="end", fill="var(--quiet)")
 
 
 def _drawn(item: Layer, pair: Callable[[Iterable[float]], str]) -> str:
@@ -124,8 +124,8 @@ def _drawn(item: Layer, pair: Callable[[Iterable[float]], str]) -> str:
         d = outline(np.vstack((points[good], back)).tolist(), True, pair)
         return element("path", d=d, fill=item.colour, fill_opacity=0.2)
     if item.kind == "dots":
-        good = np.isfinite(points).all(axis=1)
-        d = "".join(f"M{pair(point)}h0" for point in points[good].tolist())
+        whole = points[np.isfinite(points).all(axis=1)].tolist()
+        d = "".join(f"M{pair(point)}h0" for point in whole)
         return element("path", d=d, stroke=item.colour, stroke_width=5, stroke_linecap="round")
     d = outline(points.tolist(), False, pair)
     return element("path", d=d, fill="none", stroke=item.colour, stroke_width=1.6)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 def camber(spin: Scalars, side: int = 1) -> sympy.Expr:
     """Return the camber angle [rad], positive where the top leans outward."""
     x, y, z = _three(spin, "the axis of a wheel")
-    return -_sign(side) * _angle(z, length((x, y)))
+    return as_sympy(-_sign(side) * _angle(z, length((x, y))))
 
 
 def toe(spin: Scalars, side: int = 1) -> sympy.Expr:
@@ -37,7 +37,7 @@ def toe(spin: Scalars, side: int = 1) -> sympy.Expr:
     Of a wheel that is steered it is the steer angle with that sign.
     """
     x, y, _ = _three(spin, "the axis of a wheel")
-    return _sign(side) * _angle(x, y)
+    return as_sympy(_sign(side) * _angle(x, y))
 
 
 def caster(lower: AnyPoint, upper: AnyPoint) -> sympy.Expr:
@@ -57,7 +57,7 @@ def scrub_radius(lower: AnyPoint, upper: AnyPoint, contact: AnyPoint, side: int 
 
     It is measured at the height of `contact`, as the trail is.
     """
-    return _sign(side) * _behind(lower, upper, contact)[1]
+    return as_sympy(_sign(side) * _behind(lower, upper, contact)[1])
 
 
 def trail(lower: AnyPoint, upper: AnyPoint, contact: AnyPoint) -> sympy.Expr:
@@ -67,7 +67,7 @@ def trail(lower: AnyPoint, upper: AnyPoint, contact: AnyPoint) -> sympy.Expr:
 
 def track(contact: AnyPoint, side: int = 1) -> sympy.Expr:
     """Return the track of an axle that is symmetric about y = 0 [length]."""
-    return 2 * _sign(side) * _place(contact)[1]
+    return as_sympy(2 * _sign(side) * _place(contact)[1])
 
 
 def roll_centre_height(contact: AnyPoint) -> sympy.Expr:
@@ -78,7 +78,7 @@ def roll_centre_height(contact: AnyPoint) -> sympy.Expr:
     up or down, and one that is not steered at that time.
     """
     _, y, z = _place(contact)
-    return y * velocity_ratio(y, z)
+    return as_sympy(y * velocity_ratio(y, z))
 
 
 def motion_ratio(spring: Scalar, wheel: AnyPoint) -> sympy.Expr:

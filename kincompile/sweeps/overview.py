@@ -95,8 +95,8 @@ class Overview:
         unit, factor = shown_unit(item.kept.unit, angle_unit)
         numbers = (item.least.value, item.greatest.value, item.mean)
         noise = NOISE * max(map(abs, numbers[:2]))
-        numbers = tuple(0.0 if abs(x) <= noise else x for x in numbers)
-        least, greatest, mean = (f"{factor * x:.6g}" if math.isfinite(x) else "-" for x in numbers)
+        shown = (0.0 if abs(x) <= noise else factor * x for x in numbers)
+        least, greatest, mean = (f"{x:.6g}" if math.isfinite(x) else "-" for x in shown)
         at, where = self._place(item.least, angle_unit), self._place(item.greatest, angle_unit)
         return [item.kept.name, unit, least, at, greatest, where, mean]
 

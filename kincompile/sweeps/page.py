@@ -102,5 +102,5 @@ def _failed(seen: Overview, angle_unit: str) -> Iterator[str]:
     x, y = (factor * seen.samples[:, k] for k, (_, _, factor) in enumerate(named[:2]))
     found = Layer("dots", x[seen.is_good], y[seen.is_good], None, "var(--quiet)", "found")
     failed = Layer("dots", x[~seen.is_good], y[~seen.is_good], None, "var(--numeric)", "failed")
-    labels = (titled(*item[:2]) for item in named[:2])
-    yield plot_svg("Where motions failed", *labels, (found, failed))
+    across, up = (titled(*item[:2]) for item in named[:2])
+    yield plot_svg("Where motions failed", across, up, (found, failed))

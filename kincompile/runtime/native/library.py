@@ -91,8 +91,8 @@ def library(
     source = next(iter(files.values()))
     command = (*_compiler(), *_level(source), *FLAGS, *OWN, *part, *_machine_flags())
     digest = hashlib.sha256()
-    for part in (*command, _version(command[0]), _processor(), *files, *files.values()):
-        digest.update(part.encode() + b"\0")
+    for text in (*command, _version(command[0]), _processor(), *files, *files.values()):
+        digest.update(text.encode() + b"\0")
     folder = _own_folder(_cache_folder())
     kept = None if folder is None else folder / f"{name}-{digest.hexdigest()[:32]}.so"
     if kept is not None and _is_intact(kept):

@@ -54,7 +54,7 @@ def _drawn_and_found(equations: Problem, guess: Array, found: Array, t: float) -
 def _changed(equations: Problem, q: Array, t: float) -> Iterator[str]:
     """Yield the pins that are on another side in the second position than in the first, (2, n)."""
     code = equations.code
-    if not all(map(code.has, (POINTS, JOINTS, DRIVERS))):
+    if not (code.has(POINTS) and code.has(JOINTS) and code.has(DRIVERS)):
         return
     joints = code.request(JOINTS)
     driven = {name for name, *_ in code.request(DRIVERS)(t, equations.p)}
@@ -75,7 +75,7 @@ class _Pins:
         code, rates = equations.code, np.zeros_like(q)
         points, self.joints = code.points(), code.request(JOINTS)
         self.rows: dict[str, int] = {}
-        if points.observe is None or any(count != 3 for _, _, count in code.bodies):
+        if any(count != 3 for _, _, count in code.bodies):
             return  # in space there are no sides
         self.Phi = np.asarray(code.position(q, t, equations.p)[0])
         self.values = np.asarray(points.observe(q, rates, rates, t, equations.p)[0])

@@ -27,7 +27,7 @@ MODEL = arm()
 def is_equal(quantity: str, x: str, y: str) -> bool:
     """Return whether formulas are accepted for the rows of the pin."""
     rows = [["-1", "0", x], ["0", "-1", y]] if quantity == "Phi_q" else [x, y]
-    return kc.compare(MODEL, constraint="pin", **{quantity: rows}).equal  # type: ignore[arg-type]
+    return bool(kc.compare(MODEL, constraint="pin", **{quantity: rows}).equal)
 
 
 @pytest.mark.parametrize(

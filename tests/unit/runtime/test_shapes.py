@@ -1,6 +1,7 @@
 """Straightness, roundness and dwells against closed forms and linkages of the literature."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,7 +104,8 @@ def test_the_nearest_circle_is_that_of_least_squares():
     angle = np.linspace(0.3, 2.0, 40)
     rows = np.column_stack((3 + 2 * np.cos(angle), 1 + 2 * np.sin(angle)))
     rows += 0.05 * rng.standard_normal(rows.shape)
-    expected = least_squares(
+    solve: Any = least_squares
+    expected = solve(
         lambda v: np.hypot(rows[:, 0] - v[0], rows[:, 1] - v[1]) - v[2], [3, 1, 2], xtol=1e-15
     )
     found = nearest_circle(rows)
