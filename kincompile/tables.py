@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from kincompile.criteria import NOISE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
 
 
 def table(
@@ -55,17 +59,17 @@ def counted(number: int, what: str) -> str:
 
 def pose(q: Sequence[float]) -> str:
     """Return where a body is: x, y and its angle; in space x, y, z, an angle and its axis."""
+    q = without_noise(q, max(map(abs, q))).tolist()
     if len(q) == 3:
-        x, y, phi = _without_noise(q)
+        x, y, phi = q
         return f"at ({x:.4g}, {y:.4g}), angle {phi:.4g} rad"
-    x, y, z, e0, *e = _without_noise(q)
+    x, y, z, e0, *e = q
     size = math.hypot(*e)
     angle = 2 * math.atan2(size, e0)
     about = ", ".join(f"{item / (size or 1.0):.4g}" for item in e)
     return f"at ({x:.4g}, {y:.4g}, {z:.4g}), angle {angle:.4g} rad about ({about})"
 
 
-def _without_noise(q: Sequence[float]) -> list[float]:
-    """Return numbers of a position, zero for those that are rounding errors beside the largest."""
-    least = NOISE * max(map(abs, q), default=0.0)
-    return [value if abs(value) > least else 0.0 for value in q]
+def without_noise(values: ArrayLike, size: float) -> NDArray[np.float64]:
+    """Return the values, with zero for those that are rounding errors beside a size."""
+    return np.where(np.abs(values) <= NOISE * size, 0.0, values)

@@ -123,8 +123,6 @@ def _is_product(before: str, token: str, gap: str) -> bool:
     if before[0].isalpha() or before[0] == "_":
         # A name before a bracket is a call, and refused unless it is a function.
         return before not in FUNCTIONS and gap != "" and token[0].isalpha()
-    if before == ")":
-        return token == "(" or token[0].isalpha()
     if before == "0" and not gap and token[0] in "xXoObB":
         return False  # a number in another base, which is refused
     return token == "(" or token[0].isalpha()

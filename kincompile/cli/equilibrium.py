@@ -11,8 +11,8 @@ import kincompile as kc
 from kincompile.cli import shared
 from kincompile.cli.motion import set_values
 from kincompile.errors import InputError
-from kincompile.runtime.results.write import without_noise
-from kincompile.tables import table
+from kincompile.runtime.results.columns import largest
+from kincompile.tables import table, without_noise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -65,7 +65,8 @@ def _listed(module: ModuleType, found: Sequence[kc.Equilibrium], t: float) -> li
     many = "1 equilibrium" if len(found) == 1 else f"{len(found)} equilibria"
     numbers = [str(k) for k in range(1, len(found) + 1)]
     rows = [["", "", *(item.stability[0] for item in found)]]
-    values = without_noise(np.stack([item.q[0] for item in found]))
+    values = np.stack([item.q[0] for item in found])
+    values = without_noise(values, largest(values))
     for name, shown in zip(module.COORDINATES, values.T, strict=True):
         rows.append([name, module.UNITS[name], *(f"{value + 0.0:.6g}" for value in shown)])
     heading = f"{module.NAME}: {many} at t = {t:g}"

@@ -115,8 +115,10 @@ def _answers(
 ) -> list[str]:
     """Return a sentence for each path and each dwell that is asked for."""
     found = []
-    for kind, given in (("straight", lines), ("circle", circles)):
-        measure = solution.straightness if kind == "straight" else solution.roundness
+    for kind, measure, given in (
+        ("straight", solution.straightness, lines),
+        ("circle", solution.roundness, circles),
+    ):
         for text in given:
             point, is_part, part = text.partition("=")
             found.append(f"{measure(point, _numbers(kind, text, part, 2) if is_part else None)}")

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from kincompile.criteria import NOISE
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.sweeps.layout import STATUS
-from kincompile.tables import table
+from kincompile.tables import table, without_noise
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -94,8 +93,7 @@ class Overview:
     def _row(self, item: Found, angle_unit: str) -> list[str]:
         unit, factor = shown_unit(item.kept.unit, angle_unit)
         numbers = (item.least.value, item.greatest.value, item.mean)
-        noise = NOISE * max(map(abs, numbers[:2]))
-        shown = (0.0 if abs(x) <= noise else factor * x for x in numbers)
+        shown = factor * without_noise(numbers, max(map(abs, numbers[:2])))
         least, greatest, mean = (f"{x:.6g}" if math.isfinite(x) else "-" for x in shown)
         at, where = self._place(item.least, angle_unit), self._place(item.greatest, angle_unit)
         return [item.kept.name, unit, least, at, greatest, where, mean]

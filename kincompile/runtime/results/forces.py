@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import HALF, NOISE, RANK, SAME, TINY, probe_of
+from kincompile.criteria import HALF, RANK, SAME, TINY, probe_of
 from kincompile.errors import InputError, SingularConfigurationWarning
 from kincompile.html import Tabled
 from kincompile.names import column_name, listed, multiplier, unknown
@@ -22,6 +22,7 @@ from kincompile.runtime.engine.linear import powers_of_rows
 from kincompile.runtime.results.columns import largest
 from kincompile.runtime.results.observed import Points
 from kincompile.runtime.results.solution import OfMotion, Solution, orientation, require_solution
+from kincompile.tables import without_noise
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -441,9 +442,9 @@ class ForceMeasures(Tabled):
         rows: list[tuple[str, ...]] = []
         for item in self.items:
             at = item.t_greatest if item.peak == abs(item.greatest) else item.t_least
-            mean = item.mean if abs(item.mean) > NOISE * item.peak else 0.0
-            numbers = (f"{x:.6g}" for x in (item.peak, at, item.rms, mean))
-            rows.append((item.name, *numbers, item.unit))
+            numbers = (item.peak, at, item.rms, without_noise(item.mean, item.peak))
+            texts = (f"{x:.6g}" for x in numbers)
+            rows.append((item.name, *texts, item.unit))
         return rows
 
     def headline(self) -> str:

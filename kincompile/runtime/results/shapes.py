@@ -262,14 +262,9 @@ def dwell(
             code.request(DRIVERS)(t, p) for t in (start, min(stop, last), first, first + over)
         )
         for k, (driver, unit, *_) in enumerate(here):
-            moved = [_driven(rows[k]) for rows in (there, here, further, begin)]
+            moved = [float(rows[k][3]) for rows in (there, here, further, begin)]
             travel[driver], units[driver] = moved[0] - moved[1] + moved[2] - moved[3], unit
     return Dwell(column.name, column.unit, float(level), float(within), start, stop, travel, units)
-
-
-def _driven(row: tuple[Any, ...]) -> float:
-    """Return the value of a driver."""
-    return float(row[3])
 
 
 def _is_cyclic(curve: Any) -> bool:

@@ -14,7 +14,7 @@ from kincompile.errors import InputError
 from kincompile.runtime.results.columns import TIME_UNIT, largest, shown_unit, titled
 from kincompile.runtime.results.solution import require_solution
 from kincompile.runtime.status import Status
-from kincompile.tables import counted, table
+from kincompile.tables import counted, table, without_noise
 from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
@@ -204,7 +204,7 @@ def variant_named(solution: Solution, number: int) -> str:
 def _table(solution: Solution, angle_unit: str) -> list[str]:
     """Return the lines of the table of coordinates."""
     motion = solution.q, solution.q_dot, solution.q_ddot
-    shown = [without_noise(values).T for values in motion]
+    shown = [without_noise(values, largest(values)).T for values in motion]
     rows = []
     for name, q, q_dot, q_ddot in zip(solution.coordinates, *shown, strict=True):
         unit, factor = shown_unit(solution.units[name], angle_unit)
@@ -212,11 +212,6 @@ def _table(solution: Solution, angle_unit: str) -> list[str]:
         rows.append([name, unit, *_extremes(solution.t, factor * q), *rates])
     header = ("coordinate", "unit", "min", "at t", "max", "at t", *_NUMBERS[3:])
     return table(header, rows, right=_NUMBERS)
-
-
-def without_noise(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the values, with zero for those that are rounding errors of the largest."""
-    return np.where(np.abs(values) < NOISE * largest(values), 0.0, values)
 
 
 def _extremes(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[str, str, str, str]:
