@@ -75,8 +75,8 @@ class _Pins:
         code, rates = equations.code, np.zeros_like(q)
         points, self.joints = code.points(), code.request(JOINTS)
         self.rows: dict[str, int] = {}
-        if any(count != 3 for _, _, count in code.bodies):
-            return  # in space there are no sides
+        if not points.outputs or any(count != 3 for _, _, count in code.bodies):
+            return  # no point is known, or in space, where there are no sides
         self.Phi = np.asarray(code.position(q, t, equations.p)[0])
         self.values = np.asarray(points.observe(q, rates, rates, t, equations.p)[0])
         self.columns = {name: k for k, name in enumerate(points.outputs)}
