@@ -45,6 +45,7 @@ _NO_INK = re.compile(r"\\(?:left|right|big|Big|[,;:! ]|quad|displaystyle)(?![a-z
 _FACTORS = re.compile(r"(?<=[\w)])[ \t]+(?=[A-Za-z0-9(])|(?<=\))(?=[\w(])")
 _TOKEN = re.compile(r"(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][+-]?\d+(?!\w))?|[A-Za-z_]\w*|\*\*|\S")
 _VALUE = re.compile(r"[\w.)]")
+_COEFFICIENT = re.compile(r"\s*[-+]?\s*(\d+(?:[.,]\d+)?)\s*/\s*(\d+(?:[.,]\d+)?)")
 _THOUSANDS = re.compile(r"[1-9]\d{0,2},\d{3}")
 IN_DEGREES = ("sind", "cosd", "tand")
 """Functions of an angle in degrees, which no formula here has."""
@@ -66,7 +67,8 @@ def explicit(text: str, place: TextPlace | None, names: Collection[str]) -> str:
     """Return one formula with its products written out, and its decimal commas as points.
 
     ``5.2sin(phi)``, ``4.5 phi_dot^2 Cos(phi)`` and ``2(x + y)(x - y)`` are products; ``a(b)`` stays
-    as it is: a name that is no function is refused there.
+    as it is: a name that is no function is refused there. A fraction of two numbers and a blank at
+    the beginning of a term are its coefficient, ``1/2 sin(phi)``; ``1/2sin(phi)`` is refused.
 
     Raises
     ------
@@ -78,6 +80,7 @@ def explicit(text: str, place: TextPlace | None, names: Collection[str]) -> str:
     source, before, end = Source(text, place or TextPlace()), "", 0
     parts: list[str] = []
     divided = [False]  # in each open bracket, whether a / stands in the term
+    begins = [0]  # and where the term begins
     takes_two = [False]  # whether a comma separates arguments there
     for found in _TOKEN.finditer(text):
         token, at = found[0], found.start()
@@ -92,11 +95,8 @@ def explicit(text: str, place: TextPlace | None, names: Collection[str]) -> str:
         gap = text[end:at]
         if _is_product(before, token, gap):
             if divided[-1]:
-                raise source.error(
-                    "a quotient before a product without a sign can be read in two ways; write "
-                    "(a/b)*c or a/(b*c)",
-                    at,
-                )
+                _require_coefficient(text[begins[-1] : end], gap, source, at)
+                divided[-1] = False
             gap = f"*{gap[1:]}"
         if token in "([":
             calls = before if before in FUNCTIONS or before == "Piecewise" else ""
@@ -104,16 +104,36 @@ def explicit(text: str, place: TextPlace | None, names: Collection[str]) -> str:
                 FUNCTIONS[calls][2] > 1 if calls else before[:1].isalpha() or takes_two[-1]
             ))  # fmt: skip
             divided.append(False)
+            begins.append(found.end())
         elif token in ")]" and len(divided) > 1:
             takes_two.pop()
             divided.pop()
+            begins.pop()
         elif token.endswith((*"+-,<>=",)) and before not in ("", "^", "**", "*", "/"):
-            divided[-1] = False
+            divided[-1], begins[-1] = False, found.end()
         elif token == "/":
             divided[-1] = True
         parts += [gap, token]
         before, end = token, found.end()
     return "".join([*parts, text[end:]])
+
+
+def _require_coefficient(term: str, gap: str, source: Source, at: int) -> None:
+    """Refuse a quotient before a factor, unless it is a fraction of numbers and a blank."""
+    numbers = _COEFFICIENT.fullmatch(term)
+    if numbers is None:
+        raise source.error(
+            "a quotient before a product without a sign can be read in two ways; write (a/b)*c or "
+            "a/(b*c)",
+            at,
+        )
+    if not gap:
+        a, b = numbers.groups()
+        raise source.error(
+            f"{a}/{b} before a factor can be read as ({a}/{b})*c or {a}/({b}*c); write one of "
+            f"these, or a blank after {a}/{b} for the first",
+            at,
+        )
 
 
 def _is_product(before: str, token: str, gap: str) -> bool:

@@ -19,7 +19,13 @@ from kincompile.writing import require_writable
     metavar="R",
     help="Relative error up to which a rounded number counts, at most 0.1; else 0.",
 )
-def command(folder: str, output: str | None, tolerance: float) -> None:
+@click.option(
+    "--digits",
+    type=int,
+    metavar="N",
+    help="Significant digits to which a rounded number must agree, 1 to 6, to count.",
+)
+def command(folder: str, output: str | None, tolerance: float, digits: int | None) -> None:
     """Mark the hand-in files in FOLDER, which `kincompile exercise` wrote.
 
     The table has a line for each student: points, those of each blank, the reasons, and apart
@@ -27,7 +33,7 @@ def command(folder: str, output: str | None, tolerance: float) -> None:
     """
     if output is not None:
         require_writable(output)
-    marks = kc.mark(folder, tolerance=tolerance)
+    marks = kc.mark(folder, tolerance=tolerance, digits=digits)
     if output is None:
         print_data(marks.to_csv())
     else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import os
@@ -10,23 +9,23 @@ import re
 import time
 import traceback
 import warnings
-from dataclasses import dataclass, fields
+from dataclasses import fields, replace
 from functools import partial
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-import sympy
-
 from kincompile.checker.compare import compare
+from kincompile.checker.comparison import Diagnosis
+from kincompile.checker.judged import UNEXPLAINED
 from kincompile.checker.reference import Reference
 from kincompile.errors import InputError, InternalError, KincompileError
 from kincompile.exercises.blanks import PLACE, Blank
 from kincompile.exercises.kit import BLANKS, FORMAT, HAND_IN, INSTRUCTOR, MODELS, STUDENTS
+from kincompile.exercises.marks import EMPTY, RIGHT, ROUNDED, UNREAD, Mark, Marks
+from kincompile.exercises.rounded import Leeway, meant
 from kincompile.files.content import decoded, file_content
 from kincompile.files.files import read
 from kincompile.names import column_name, escaped, listed
-from kincompile.writing import write_atomically
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -43,6 +42,9 @@ SECONDS, MOST_MEMORY = 60, 2_000_000_000
 MOST_CHARACTERS = 300
 """Characters of a reason."""
 
+STOPPED, PLACE_MISSED = "stopped", "another entry named"
+"""What marks are besides right, wrong, not filled and not read."""
+
 _COMMENT = re.compile(r"[#%].*")
 _LINE = re.compile(r"\s*([BP]\d+)\b\s*(=?)\s*(.*)", re.IGNORECASE)
 _ENTRY = re.compile(r"(?:Phi_q\s*)?\[?\s*([^,\[\]]+?)\s*,\s*([^,\[\]]+?)\s*\]?", re.IGNORECASE)
@@ -51,89 +53,11 @@ _PLACE = re.compile(r"\w+, row \d+, column \d+: (line 1, )?")
 """Where a formula stands in a matrix, which no student has seen."""
 _LISTED = re.compile(r"(?<=functions): sin, .*|; the functions are: .*", re.DOTALL)
 """All functions by name, too long for a cell."""
-_LITERAL = re.compile(r"(?<![\w.,^])(?<!\*\*)\d+(?:[.,]\d+)?(?![\w.,]*[eE][+-]?\d)(?![\d_])")
-"""A number that is no exponent, and has none."""
-MOST_TOLERANCE = 0.1
-"""Largest relative error of a rounded number that may be asked for."""
-
-RIGHT, EMPTY = "right", "not filled"
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """Points of a blank, with the reason.
-
-    Attributes
-    ----------
-    blank
-        What was to be filled.
-    points
-        1 where it is right, else 0.
-    reason
-        ``"right"``, ``"not filled"``, or what is wrong, without the right formula.
-    is_read
-        Whether the answer could be read; one that could not is no wrong answer.
-    """
-
-    blank: Blank
-    points: int
-    reason: str
-    is_read: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class Marks:
-    """The marks of all students of an exercise.
-
-    Attributes
-    ----------
-    folder
-        The exercise.
-    students
-        The marks of each student by name; none where nothing was handed in.
-    """
-
-    folder: Path
-    students: Mapping[str, tuple[Mark, ...]]
-
-    def to_csv(self) -> str:
-        """Return a table: a line a student, with points, those of each blank, and reasons.
-
-        A blank that cannot be read has ``?``, and its reason stands in a column of its own.
-        """
-        blanks = next(iter(self.students.values()))
-        rows = StringIO()
-        table = csv.writer(rows, lineterminator="\n")
-        names = [item.blank.name for item in blanks]
-        table.writerow(["student", "points", "of", *names, "reasons", "not read"])
-        for student, marks in self.students.items():
-            points = [item.points if item.is_read else "?" for item in marks]
-            table.writerow([
-                _cell(student), sum(item.points for item in marks), len(marks), *points,
-                *(_cell(_reasons(marks, is_read)) for is_read in (True, False)),
-            ])  # fmt: skip
-        return rows.getvalue()
-
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write the table to a file, in one step."""
-        return write_atomically(path, self.to_csv())
-
-
-def _reasons(marks: Sequence[Mark], is_read: bool) -> str:
-    """Return why points are lost, each reason once after the names of its blanks."""
-    blanks: dict[str, list[str]] = {}
-    for item in marks:
-        if item.reason != RIGHT and item.is_read is is_read:
-            blanks.setdefault(item.reason, []).append(item.blank.name)
-    return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in blanks.items())
-
-
-def _cell(text: str) -> str:
-    """Return a text that no spreadsheet takes for a formula."""
-    return f"'{text}" if text.startswith(("=", "+", "-", "@")) else text
-
-
-def mark(folder: str | os.PathLike[str], *, tolerance: float = 0.0) -> Marks:
+def mark(
+    folder: str | os.PathLike[str], *, tolerance: float = 0.0, digits: int | None = None
+) -> Marks:
     """Mark the hand-in files of an exercise that `exercise` wrote.
 
     An entry is right if it is equal to the derived one at random states, however it is written; of
@@ -146,14 +70,17 @@ def mark(folder: str | os.PathLike[str], *, tolerance: float = 0.0) -> Marks:
     tolerance
         How much a number that was rounded may differ, relative to itself: with 0.01 the entry
         counts where 3.2 stands for 3.1875. With 0 it does not, and the reason names the number.
+    digits
+        Significant digits to which numbers must agree, 1 to 6, in the place of a tolerance: a
+        number counts where it differs from the right one by half a unit of that digit at most.
 
     Raises
     ------
     InputError
-        If the folder is no exercise, or the tolerance is not from 0 to 0.1.
+        If the folder is no exercise, the tolerance is not from 0 to 0.1, or digits are not from 1
+        to 6.
     """
-    if not 0 <= tolerance <= MOST_TOLERANCE:
-        raise InputError(f"tolerance is {tolerance}; give one from 0 to {MOST_TOLERANCE}")
+    leeway = Leeway(tolerance, digits)
     target = Path(folder)
     key = _key(target)
     found: dict[str, tuple[Mark, ...]] = {}
@@ -161,50 +88,43 @@ def mark(folder: str | os.PathLike[str], *, tolerance: float = 0.0) -> Marks:
         lines, problem = _lines(target / STUDENTS / student / HAND_IN)
         answers, unread = _answers(lines)
         marks = {
-            item: Mark(item, 0, problem or unread.get(item.name, EMPTY), item.name not in unread)
+            item: Mark(item, 0, unread[item.name], UNREAD)
+            if item.name in unread
+            else Mark(item, 0, problem or EMPTY, EMPTY)
             for item in blanks
         }
         if answers:
             path = target / INSTRUCTOR / MODELS / f"{student}.toml"
-            marks |= within_budget(partial(_student, path, blanks, answers, tolerance), blanks)
-        found[student] = tuple(marks.values())
+            marks |= within_budget(partial(_student, path, blanks, answers, leeway), blanks)
+        found[student] = tuple(
+            replace(item, answer=answers.get(item.blank.name, "")) for item in marks.values()
+        )
     return Marks(target, found)
 
 
 def _student(
-    path: Path, blanks: Sequence[Blank], answers: Mapping[str, str], tolerance: float
+    path: Path, blanks: Sequence[Blank], answers: Mapping[str, str], leeway: Leeway
 ) -> dict[Blank, Mark]:
     reference = Reference(read(path).system())
     marks = _marked(reference, blanks, answers)
     for item, found in marks.items():
         if not found.points and found.is_read and item.quantity != PLACE:
-            marks[item] = _rounding(reference, found, answers[item.name], tolerance)
+            marks[item] = _rounding(reference, found, answers[item.name], leeway)
     return marks
 
 
-def _rounding(reference: Reference, found: Mark, answer: str, tolerance: float) -> Mark:
+def _rounding(reference: Reference, found: Mark, answer: str, leeway: Leeway) -> Mark:
     """Return the mark of a wrong entry, which may be right but for numbers that were rounded."""
-    system, blank = reference.system, found.blank
-    right = blank.answer(system.Phi_q, system.gamma)
-    numbers = {abs(float(item)) for item in right.atoms(sympy.Number)}
-    rounded: dict[str, float] = {}
-
-    def unrounded(token: re.Match[str]) -> str:
-        text = token[0].replace(",", ".")
-        part = 0.5 * 10.0 ** -len(text.partition(".")[2]) * (1 + 1e-9)
-        near = [x for x in numbers if abs(float(text) - x) <= part]
-        if len(near) != 1 or float(text) in numbers:
-            return token[0]
-        rounded[text] = near[0]
-        return repr(near[0])
-
-    exact = _LITERAL.sub(unrounded, answer)
-    if not rounded or not _alone(reference, blank, {blank.name: exact})[blank].points:
-        return found
-    if all(abs(float(text) - x) <= tolerance * x for text, x in rounded.items()):
-        return Mark(blank, 1, RIGHT)
-    numbers_rounded = " and ".join(f"{x:g} was rounded to {text}" for text, x in rounded.items())
-    return Mark(blank, 0, f"{numbers_rounded}; else the entry is right")
+    blank = found.blank
+    for exact, numbers in meant(reference, blank, answer, leeway):
+        if not _alone(reference, blank, {blank.name: exact})[blank].points:
+            continue
+        if all(leeway.allows(float(text), x) for text, x in numbers.items()):
+            stands = " and ".join(f"{text} stands for {x:g}" for text, x in numbers.items())
+            return Mark(blank, 1, f"right {leeway.words}: {stands}", RIGHT)
+        rounded = " and ".join(f"{x:g} was rounded to {text}" for text, x in numbers.items())
+        return Mark(blank, 0, f"{rounded}; else the entry is right", ROUNDED)
+    return found
 
 
 def within_budget(
@@ -232,7 +152,7 @@ def within_budget(
         bug = InternalError(f"marking ended by {text}.")
         bug.add_note(trace)
         raise bug
-    return {item: Mark(item, 0, f"stopped: {found}") for item in blanks}
+    return {item: Mark(item, 0, f"stopped: {found}", STOPPED) for item in blanks}
 
 
 def _in_a_process(work: Callable[[], dict[Blank, Mark]]) -> Any:
@@ -271,7 +191,7 @@ def _work_and_tell(work: Callable[[], dict[Blank, Mark]], writer: int) -> NoRetu
 def _outcome(work: Callable[[], dict[Blank, Mark]]) -> tuple[str, Any]:
     """Return how a student's work ended, in a word, and its marks or what is wrong."""
     try:
-        rows = [(x.blank.name, x.points, x.reason, x.is_read) for x in work().values()]
+        rows = [(x.blank.name, x.points, x.reason, x.kind) for x in work().values()]
     except MemoryError:
         raise
     except RecursionError:
@@ -380,7 +300,7 @@ def _alone(reference: Reference, blank: Blank, answers: Mapping[str, str]) -> di
     except KincompileError as error:
         why = _LISTED.sub("", _PLACE.sub("", str(error)))
         text = f"cannot be read: {answers[blank.name]} ({why})"
-        return {blank: Mark(blank, 0, _short(text), is_read=False)}
+        return {blank: Mark(blank, 0, _short(text), UNREAD)}
 
 
 def _compared(
@@ -418,17 +338,18 @@ def _place_mark(system: ConstraintSystem, blank: Blank, answer: str) -> Mark:
         return Mark(blank, 0, _short(
             f"no entry of Phi_q of {blank.constraint}: {answer}. Write an equation and a "
             f"coordinate, as {equations[0]}, {coordinates[0]}"
-        ))  # fmt: skip
+        ), PLACE_MISSED)  # fmt: skip
     if (row, column) == (system.equations[blank.row], coordinates[blank.column or 0]):
-        return Mark(blank, 1, RIGHT)
-    return Mark(blank, 0, f"{row}, {column} is right as it stands")
+        return Mark(blank, 1, RIGHT, RIGHT)
+    return Mark(blank, 0, f"{row}, {column} is right as it stands", PLACE_MISSED)
 
 
 def _mark_of(blank: Blank, entry: ComparedEntry) -> Mark:
     if entry.accepted:
-        return Mark(blank, 1, RIGHT)
-    texts = [item.text for item in entry.diagnoses]
-    return Mark(blank, 0, _short(texts[0] if texts else "different from the derived entry"))
+        return Mark(blank, 1, RIGHT, RIGHT)
+    unnamed = Diagnosis(UNEXPLAINED, "different from the derived entry")
+    first = next(iter(entry.diagnoses), unnamed)
+    return Mark(blank, 0, _short(first.text), first.kind)
 
 
 def _rows(system: ConstraintSystem, constraint: str) -> tuple[int, int]:

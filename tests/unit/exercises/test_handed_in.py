@@ -35,6 +35,7 @@ def is_equal(quantity: str, x: str, y: str) -> bool:
     [
         "3.1875 cos(phi_arm)", "3.1875cos(phi_arm)", "3,1875 cos(phi_arm)", "3.1875 Cos(phi_arm)",
         "3.1875(cos(phi_arm))", "(3.1875)(cos(phi_arm))",
+        "6.375/2 cos(phi_arm)", "0 - -6,3750/2 cos(phi_arm)", "(6.375 /2 cos(phi_arm))",
         "6.375 cos(phi_arm)/2", r"3.1875 \cos{\left(\phi_{arm} \right)}", "3.1875 COS(phi_1)",
     ],
 )  # fmt: skip
@@ -61,7 +62,12 @@ def test_that_rates_are_read_as_sympy_and_people_write_them(text: str) -> None:
     [
         ("3,125*cos(phi_arm)", "3,125 can be read in two ways; write 3.125 or 3125"),
         ("3.1875 cosd(phi_arm)", "cosd takes degrees"),
-        ("1/2 cos(phi_arm)", r"a quotient before a product .* write \(a/b\)\*c"),
+        ("phi_arm/2 cos(phi_arm)", r"a quotient before a product .* write \(a/b\)\*c"),
+        ("3 + phi_arm^1/2 cos(phi_arm)", "a quotient before a product"),
+        ("phi_arm^-1/2 cos(phi_arm)", "a quotient before a product"),
+        ("1/2 phi_arm/3 cos(phi_arm)", "a quotient before a product"),
+        ("1/2cos(phi_arm)", r"1/2 before a factor can be read as \(1/2\)\*c or 1/\(2\*c\)"),
+        ("1,5/2phi_arm", r"write one of these, or a blank after 1,5/2 for the first"),
         ("phi_arm(3.1875)", "'phi_arm' is not a function.*; write \\* for a product"),
         ("3.1875 phi_arm (2)", "'phi_arm' is not a function"),
         ("3 1875 cos(phi_arm)", "found"),
@@ -113,6 +119,56 @@ def test_that_marks_say_what_was_rounded_and_what_cannot_be_read(tmp_path: Path)
     assert [marked(folder, "--tolerance", "1e-5")[f"B{k}"] for k in (1, 2)] == ["0", "1"]
     with pytest.raises(kc.InputError, match=r"tolerance is nan; give one from 0 to 0\.1"):
         kc.mark(folder, tolerance=float("nan"))
+
+
+def hand_in(folder: Path, *answers: str) -> Path:
+    """Write the answers of the only student, and return the folder."""
+    path = folder / "students" / "01" / "hand_in.txt"
+    lines = [f"B{k} = {answer}\n" for k, answer in enumerate(answers, 1)]
+    path.write_text("".join(lines), encoding="utf-8")
+    return folder
+
+
+def test_that_numbers_count_to_the_digits_asked_for(tmp_path: Path) -> None:
+    """The length is 2.86875: 2.87 has three of its digits, 2.9 two, and 2.86 is no rounding."""
+    folder = kc.exercise(MODEL, 1, 1).write(tmp_path / "kit")
+    gamma = "{} phi_arm_dot^2 cos(phi_arm)"
+    hand_in(folder, "-2.87 sin(phi_arm)", "2.9cos(phi_arm)", gamma.format("5.74/2"), "2.86")
+
+    def points(*options: str) -> str:
+        row = marked(folder, *options)
+        return "".join(row[f"B{k}"] for k in (1, 2, 3, 4))
+
+    assert points() == points("--digits", "4") == "0000"
+    assert points("--digits", "3") == "1010"
+    assert points("--digits", "2") == "1110"
+    row = marked(folder, "--digits", "3")
+    assert "B1: right to 3 digits: 2.87 stands for 2.86875" in row["reasons"]
+    assert "B2: 2.86875 was rounded to 2.9; else the entry is right" in row["reasons"]
+    assert "B3: right to 3 digits: 5.74 stands for 5.7375" in row["reasons"]
+    assert row["points"] == "2"
+    hand_in(folder, "-2.8700001 sin(phi_arm)", "2.863 cos(phi_arm)", "", "2.87 phi_arm_dot^2")
+    assert points("--digits", "3") == "1000"
+
+
+def test_that_digits_hide_no_slip(tmp_path: Path) -> None:
+    """A term of a thousandth is a slip, though the value agrees to two digits everywhere."""
+    folder = kc.exercise(MODEL, 1, 1).write(tmp_path / "kit")
+    answers = (
+        "-2.87 sin(phi_arm) + 0.001 cos(phi_arm)", "2.87 cos(1.001 phi_arm)",
+        "2.87 phi_arm_dot^2 cos(phi_arm) + 1e-4", "-2.87 phi_arm_dot^2 sin(phi_arm)",
+    )  # fmt: skip
+    row = marked(hand_in(folder, *answers), "--digits", "2")
+    assert [row[f"B{k}"] for k in (1, 2, 3, 4)] == ["0", "1", "0", "0"]
+    assert "B2: right to 2 digits: 1.001 stands for 1 and 2.87 stands for 2.86875" in row["reasons"]
+
+
+def test_that_digits_are_few_and_no_tolerance() -> None:
+    for digits in (0, 7, 2.5, True):
+        with pytest.raises(kc.InputError, match="give a number from 1 to 6"):
+            kc.mark("nowhere", digits=digits)
+    with pytest.raises(kc.InputError, match="both given; give one of them"):
+        kc.mark("nowhere", digits=3, tolerance=0.1)
 
 
 def test_that_a_reason_is_said_once(tmp_path: Path) -> None:
