@@ -93,6 +93,10 @@ def compare_sensitivities(model):
     return sum(off(*item) for item in zip(found, known, digits, strict=True))
 
 
+class FoundError(Exception):
+    """A mechanism is found, and no more are drawn."""
+
+
 def first_of(in_space, kind, load, number):
     """Return a seeded mechanism of several constraints, one of them of a type."""
     found: list[object] = []
@@ -101,10 +105,12 @@ def first_of(in_space, kind, load, number):
     @settings(max_examples=40, suppress_health_check=list(HealthCheck), phases=[Phase.generate])
     @given(mechanisms(in_space=in_space, first=kind, load=load))
     def look(model):
-        if not found and len(model.constraints) > 1 and is_usable(model):
+        if len(model.constraints) > 1 and is_usable(model):
             found.append(model)
+            raise FoundError
 
-    look()
+    with suppress(FoundError):
+        look()
     assert found, kind
     return found[0]
 
