@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from kincompile.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
 
 
 def write_atomically(
@@ -116,3 +122,33 @@ def _explanation(target: Path, error: OSError) -> str:
     else:
         remedy = f"{error.strerror or error}. Free some space, or choose another name or folder."
     return f"cannot write {target}: {remedy}"
+
+
+def write_folder(folder: str | os.PathLike[str], files: Callable[[], Mapping[str, str]]) -> Path:
+    """Write files by their paths to a new folder, whole or not at all, and return the folder."""
+    target = Path(folder)
+    require_new_folder(target)
+    try:
+        draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.resolve().parent))
+        try:
+            for path, content in files().items():
+                file = draft / path
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_bytes(content.encode())
+            draft.chmod(0o755)
+            draft.replace(target)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+    except OSError as error:
+        raise InputError(f"cannot write {target}: {error.strerror}; name another one") from error
+    return target
+
+
+def require_new_folder(folder: Path) -> None:
+    """Refuse a folder that exists and is not empty, or whose place does not exist."""
+    if folder.is_dir() and not any(folder.iterdir()):
+        return
+    if folder.exists():
+        raise InputError(f"{folder} exists: name a new folder, so that no hand-in is overwritten")
+    if not folder.resolve().parent.is_dir():
+        raise InputError(f"cannot write {folder}: the folder {folder.parent} does not exist")

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
 from dataclasses import asdict, dataclass
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import InputError
@@ -17,10 +14,12 @@ from kincompile.exercises.variants import Choices, variants
 from kincompile.model.mechanism import Mechanism
 from kincompile.names import rate
 from kincompile.report.to_html import as_html
+from kincompile.writing import write_folder
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
+    from pathlib import Path
 
     from kincompile.exercises.mistakes import Mistake
     from kincompile.model.system import ConstraintSystem
@@ -80,10 +79,10 @@ class ExerciseKit:
         page = solutions(self.name, systems, self.blanks, self.mistakes, self.students)
         found[f"{INSTRUCTOR}/solutions.html"] = as_html(page, "Solutions of")
         blanks_of = {
-            student: [asdict(item) for item in own]
-            for student, own in zip(self.students, self.blanks, strict=True)
+            student: [{**asdict(item), "question": _question(item, own, system)} for item in own]
+            for student, own, system in zip(self.students, self.blanks, systems, strict=True)
         }
-        key = {"format": FORMAT, "blanks": blanks_of}
+        key = {"format": FORMAT, "name": self.name, "blanks": blanks_of}
         found[f"{INSTRUCTOR}/{BLANKS}"] = json.dumps(key, indent=1) + "\n"
         return found
 
@@ -95,24 +94,7 @@ class ExerciseKit:
         InputError
             If the folder exists and is not empty, or cannot be made.
         """
-        target = Path(folder)
-        require_new_folder(target)
-        try:
-            draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.resolve().parent))
-            try:
-                for path, content in self.files().items():
-                    file = draft / path
-                    file.parent.mkdir(parents=True, exist_ok=True)
-                    file.write_bytes(content.encode())
-                draft.chmod(0o755)
-                draft.replace(target)
-            finally:
-                shutil.rmtree(draft, ignore_errors=True)
-        except OSError as error:
-            raise InputError(
-                f"cannot write {target}: {error.strerror}; name another one"
-            ) from error
-        return target
+        return write_folder(folder, self.files)
 
     def _hand_in(self, student: str, system: ConstraintSystem, blanks: Sequence[Blank]) -> str:
         last = system.bodies[0].coordinates[-1] if system.bodies else system.coordinates[0].name
@@ -129,12 +111,7 @@ class ExerciseKit:
             lines += [f"#   {first[x]} = {form}" for x, form in forms.items() if x in first]
         lines += ["# Lines with # are comments. An empty blank has no points.", ""]
         for item in blanks:
-            question = item.label(system)
-            if item.quantity == PLACE:
-                question = f"Phi_q of {item.constraint}: which entry is wrong?"
-            elif f"P{item.name[1:]}" in [other.name for other in blanks]:
-                question = "and what belongs there"
-            lines += [f"# {question}", f"{item.name} ="]
+            lines += [f"# {_question(item, blanks, system)}", f"{item.name} ="]
         return "\n".join(lines) + "\n"
 
     def __repr__(self) -> str:
@@ -145,6 +122,15 @@ class ExerciseKit:
     def sizes(self) -> str:
         """How many students and blanks it has, in words."""
         return f"{len(self.variants)} students, {len(self.blanks[0])} blanks"
+
+
+def _question(item: Blank, blanks: Sequence[Blank], system: ConstraintSystem) -> str:
+    """Return what a blank asks; where a mistake is to be found, without its place."""
+    if item.quantity == PLACE:
+        return f"Phi_q of {item.constraint}: which entry is wrong?"
+    if f"P{item.name[1:]}" in [other.name for other in blanks]:
+        return "and what belongs there"
+    return item.label(system)
 
 
 def exercise(
@@ -211,13 +197,3 @@ def exercise(
     ]
     filled = tuple(tuple(x for item in own for x in (item.place, item.entry)) for own in slips)
     return ExerciseKit(model.name, filled, tuple(made), tuple(slips))
-
-
-def require_new_folder(folder: Path) -> None:
-    """Refuse a folder that exists and is not empty, or whose place does not exist."""
-    if folder.is_dir() and not any(folder.iterdir()):
-        return
-    if folder.exists():
-        raise InputError(f"{folder} exists: name a new folder, so that no hand-in is overwritten")
-    if not folder.resolve().parent.is_dir():
-        raise InputError(f"cannot write {folder}: the folder {folder.parent} does not exist")

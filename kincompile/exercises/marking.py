@@ -20,8 +20,9 @@ from kincompile.checker.judged import UNEXPLAINED
 from kincompile.checker.reference import Reference
 from kincompile.errors import InputError, InternalError, KincompileError
 from kincompile.exercises.blanks import PLACE, Blank
+from kincompile.exercises.graded import EMPTY, RIGHT, ROUNDED, UNREAD, Mark
 from kincompile.exercises.kit import BLANKS, FORMAT, HAND_IN, INSTRUCTOR, MODELS, STUDENTS
-from kincompile.exercises.marks import EMPTY, RIGHT, ROUNDED, UNREAD, Mark, Marks
+from kincompile.exercises.marks import Marks
 from kincompile.exercises.rounded import Leeway, meant
 from kincompile.files.content import decoded, file_content
 from kincompile.files.files import read
@@ -82,7 +83,7 @@ def mark(
     """
     leeway = Leeway(tolerance, digits)
     target = Path(folder)
-    key = _key(target)
+    name, key, questions = _key(target)
     found: dict[str, tuple[Mark, ...]] = {}
     for student, blanks in key.items():
         lines, problem = _lines(target / STUDENTS / student / HAND_IN)
@@ -97,9 +98,14 @@ def mark(
             path = target / INSTRUCTOR / MODELS / f"{student}.toml"
             marks |= within_budget(partial(_student, path, blanks, answers, leeway), blanks)
         found[student] = tuple(
-            replace(item, answer=answers.get(item.blank.name, "")) for item in marks.values()
+            replace(
+                item,
+                answer=answers.get(item.blank.name, ""),
+                question=questions[student].get(item.blank.name, ""),
+            )
+            for item in marks.values()
         )
-    return Marks(target, found)
+    return Marks(target, name, found)
 
 
 def _student(
@@ -212,8 +218,8 @@ def _memory() -> int:
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
 
 
-def _key(folder: Path) -> dict[str, list[Blank]]:
-    """Return the blanks of each student of an exercise."""
+def _key(folder: Path) -> tuple[str, dict[str, list[Blank]], dict[str, dict[str, str]]]:
+    """Return the name of an exercise, and of each student the blanks and what they ask."""
     path = folder / INSTRUCTOR / BLANKS
     try:
         data: Any = json.loads(path.read_text(encoding="utf-8"))
@@ -227,6 +233,11 @@ def _key(folder: Path) -> dict[str, list[Blank]]:
             ]
             for student, rows in data["blanks"].items()
         }
+        questions = {
+            str(student): {row["name"]: str(row.get("question", "")) for row in rows}
+            for student, rows in data["blanks"].items()
+        }
+        name = str(data.get("name", folder.resolve().name))
     except OSError as error:
         raise InputError(
             f"{folder} is no exercise: {path} cannot be read; give the folder that "
@@ -243,7 +254,7 @@ def _key(folder: Path) -> dict[str, list[Blank]]:
         raise InputError(
             f"{path} has no blanks of {listed(without)}; write the exercise again with its seed"
         )
-    return {student: found[student] for student in students}
+    return name, {student: found[student] for student in students}, questions
 
 
 def _lines(path: Path) -> tuple[list[str], str]:

@@ -1,55 +1,26 @@
-"""The marks of a class: points and reasons of each blank, as a table."""
+"""The marks of a class: points and reasons of each blank, and what is made of them."""
 
 from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
 from io import StringIO
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kincompile.writing import write_atomically
+from kincompile.exercises.feedback import feedback
+from kincompile.exercises.gradebooks import gradebooks, read_roster
+from kincompile.exercises.graded import cell, reasons
+from kincompile.exercises.statistics import has_handed_in, statistics
+from kincompile.report.to_html import as_html
+from kincompile.writing import write_atomically, write_folder
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
+    from collections.abc import Mapping
 
-    from kincompile.exercises.blanks import Blank
-
-RIGHT, EMPTY, UNREAD = "right", "not filled", "not read"
-ROUNDED = "a number was rounded"
-"""What marks are besides faults of the checker's catalogue."""
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """Points of a blank, with the reason.
-
-    Attributes
-    ----------
-    blank
-        What was to be filled.
-    points
-        1 where it is right, else 0.
-    reason
-        ``"right"``, ``"not filled"``, or what is wrong, without the right formula; of an answer
-        that is right but for rounding and has its point, what was rounded.
-    kind
-        The fault in a few words, as the checker's catalogue has it, for statistics.
-    answer
-        What was handed in.
-    """
-
-    blank: Blank
-    points: int
-    reason: str
-    kind: str
-    answer: str = ""
-
-    @property
-    def is_read(self) -> bool:
-        """Whether the answer could be read; one that could not is no wrong answer."""
-        return self.kind != UNREAD
+    from kincompile.exercises.graded import Mark
+    from kincompile.exercises.statistics import Statistics
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +31,14 @@ class Marks:
     ----------
     folder
         The exercise.
+    name
+        Name of the mechanism.
     students
-        The marks of each student by name; none where nothing was handed in.
+        The marks of each student by name.
     """
 
     folder: Path
+    name: str
     students: Mapping[str, tuple[Mark, ...]]
 
     def to_csv(self) -> str:
@@ -81,24 +55,56 @@ class Marks:
             points = [item.points if item.is_read else "?" for item in marks]
             table.writerow([
                 cell(student), sum(item.points for item in marks), len(marks), *points,
-                *(cell(_reasons(marks, is_read)) for is_read in (True, False)),
+                *(cell(reasons(marks, is_read=is_read)) for is_read in (True, False)),
             ])  # fmt: skip
         return rows.getvalue()
 
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write the table to a file, in one step."""
-        return write_atomically(path, self.to_csv())
+    def statistics(self) -> Statistics:
+        """Count outcomes and faults, by question: ``.to_text()``, ``.to_csv()``."""
+        return statistics(self.name, self.students)
 
+    def files(
+        self, roster: str | os.PathLike[str] | None = None, title: str | None = None
+    ) -> dict[str, str]:
+        """Return the text of every file of the folder by its path; as for `write`."""
+        known = None if roster is None else read_roster(roster, self.students)
+        counted = self.statistics()
+        found = {
+            "points.csv": self.to_csv(),
+            "statistics.txt": counted.to_text(),
+            "statistics.csv": counted.to_csv(),
+            "statistics.html": as_html(counted.page(), "Statistics of"),
+            **gradebooks(self.students, known, title or self.name),
+        }
+        for student, own in self.students.items():
+            if has_handed_in(own):
+                page = feedback(self.name, student, own)
+                found[f"feedback/{student}/feedback.html"] = as_html(page, "Feedback on")
+        return found
 
-def _reasons(marks: Sequence[Mark], is_read: bool) -> str:
-    """Return what is said of blanks, each reason once after the names of its blanks."""
-    blanks: dict[str, list[str]] = {}
-    for item in marks:
-        if item.reason != RIGHT and item.is_read is is_read:
-            blanks.setdefault(item.reason, []).append(item.blank.name)
-    return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in blanks.items())
+    def write(
+        self,
+        path: str | os.PathLike[str],
+        roster: str | os.PathLike[str] | None = None,
+        title: str | None = None,
+    ) -> Path:
+        """Write the table, or a folder of points, statistics, feedback and gradebooks.
 
+        Parameters
+        ----------
+        path
+            A file, in one step; where it has no ending a new folder, whole or not at all.
+        roster
+            A table of the class with a column ``sheet``, the number of a student's folder, and
+            those that a gradebook exports. Without it that number stands for the name.
+        title
+            The column of the gradebooks; the name of the mechanism where None.
 
-def cell(text: str) -> str:
-    """Return a text that no spreadsheet takes for a formula."""
-    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
+        Raises
+        ------
+        InputError
+            If it cannot be written, or the roster cannot be used.
+        """
+        if Path(path).suffix:
+            return write_atomically(path, self.to_csv())
+        return write_folder(path, lambda: self.files(roster, title))
