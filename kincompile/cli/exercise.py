@@ -18,6 +18,7 @@ from kincompile.cli.shared import output_option, read_model
 @click.option("--signs", is_flag=True, help="Turn frames of bodies, so that signs differ too.")
 @click.option("--lengths", is_flag=True, help="Change points and distances given as numbers too.")
 @click.option("--mistakes", is_flag=True, help="Find the mistake: Jacobians with one slip each.")
+@click.option("--exam", is_flag=True, help="Numbered sheets to fill on paper, with numbers.")
 def command(
     model: str,
     output: str,
@@ -26,16 +27,24 @@ def command(
     signs: bool,
     lengths: bool,
     mistakes: bool,
+    exam: bool,
 ) -> None:
     """Write an exercise on MODEL: a page and a hand-in file for each student.
 
     Each student has a variant of the mechanism that assembles and moves, drawn on a page, and the
     same entries of Phi_q and gamma to derive; with --mistakes three Jacobians in each of which an
-    entry is wrong, other ones for each student. The folder instructor has the solutions;
-    `kincompile mark` checks what is handed in.
+    entry is wrong, other ones for each student; with --exam sheets with boxes for formulas and
+    numbers, all of them to print in students/sheets.html, and a table answers.csv. The folder
+    instructor has the solutions; `kincompile mark` checks what is handed in.
     """
     made = kc.exercise(
-        read_model(model), students, seed, signs=signs, lengths=lengths, mistakes=mistakes
+        read_model(model),
+        students,
+        seed,
+        signs=signs,
+        lengths=lengths,
+        mistakes=mistakes,
+        exam=exam,
     )
     written = made.write(Path(output))
     click.echo(f"Wrote {written}: {made.sizes}", err=True)

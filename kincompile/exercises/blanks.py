@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import chain, zip_longest
 from random import Random
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from kincompile.errors import InputError
 from kincompile.model.resolve import Joint
@@ -23,6 +23,12 @@ PLACE = "place"
 
 MOST_OPERATIONS = 60
 """Operations up to which an entry is asked for by hand."""
+
+DIGITS = 3
+"""Significant digits of a number in an exam, where a teacher asks for no others."""
+
+State: TypeAlias = dict[str, float]
+"""Values of coordinates, rates and t by name, at which an exam asks for numbers."""
 
 
 @dataclass(frozen=True, slots=True)

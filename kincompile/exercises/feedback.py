@@ -41,10 +41,11 @@ def feedback(name: str, student: str, marks: Sequence[Mark]) -> doc.Manuscript:
         chapters.append(doc.Chapter("empty", ("What is not filled",), (block,)))
     if own := groups[RIGHT]:
         rows: list[tuple[doc.Run | doc.Runs, ...]] = [
-            (item.blank.name, item.question, doc.Verbatim(item.answer), item.reason) for item in own
+            (item.blank.name, item.question, doc.Verbatim(item.answer)) for item in own
         ]
-        shown = doc.table(("question", "entry", "your answer", ""), rows)
-        chapters.append(doc.Chapter("right", ("What is right",), (shown,)))
+        shown = doc.table(("question", "entry", "your answer"), rows)
+        notes = [doc.text(f"{x.blank.name}: {x.reason}.") for x in own if x.reason != RIGHT]
+        chapters.append(doc.Chapter("right", ("What is right",), (shown, *notes)))
     points = sum(item.points for item in marks)
     summary = f"Student {student}: {points} of {len(marks)} points."
     if groups[UNREAD]:

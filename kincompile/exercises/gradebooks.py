@@ -84,7 +84,7 @@ def read_roster(path: str | os.PathLike[str], students: Iterable[str]) -> Roster
         student = by_number.get(_number(own[SHEET]))
         if student is None or student in found:
             what = "is no sheet of this exercise" if student is None else "stands there twice"
-            raise InputError(f"{file}, line {number}: sheet {own[SHEET]} {what}; mend the roster")
+            raise InputError(f"{file}, line {number}: sheet {own[SHEET]} {what}; mend the file")
         found[student] = own
     return found
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import InputError
 from kincompile.exercises.blanks import PLACE, Blank, choose_blanks
-from kincompile.exercises.sheet import sheet, solutions
+from kincompile.exercises.sheet import sheet, solutions, together
 from kincompile.exercises.variants import Choices, variants
 from kincompile.model.mechanism import Mechanism
 from kincompile.names import rate
@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from kincompile.exercises.blanks import State
     from kincompile.exercises.mistakes import Mistake
     from kincompile.model.system import ConstraintSystem
+    from kincompile.report.document import Manuscript
 
 FORMAT = 2
 """Version of what `mark` reads."""
@@ -32,6 +34,9 @@ STUDENTS, HAND_IN = "students", "hand_in.txt"
 
 INSTRUCTOR, MODELS, BLANKS = "instructor", "models", "blanks.json"
 """Folder of the instructor, in it that of the variants and what the blanks are."""
+
+ANSWERS = "answers.csv"
+"""What was written on the sheets of an exam, as the instructor types it in."""
 
 MOST_STUDENTS = 500
 """Students of one kit."""
@@ -51,12 +56,16 @@ class ExerciseKit:
         The mechanism of each student, or the free equations.
     mistakes
         The Jacobians with a slip of each student; none where entries are to be derived.
+    states, values
+        Of an exam the state of each sheet, and the values of its blanks there, as text.
     """
 
     name: str
     blanks: tuple[tuple[Blank, ...], ...]
     variants: tuple[Mechanism | ConstraintSystem, ...]
     mistakes: tuple[tuple[Mistake, ...], ...]
+    states: tuple[State, ...] = ()
+    values: tuple[Sequence[str], ...] = ()
 
     @property
     def students(self) -> tuple[str, ...]:
@@ -68,21 +77,33 @@ class ExerciseKit:
         """Return the text of every file by its path; the same for the same seed."""
         systems = [item.system() for item in self.variants]
         found: dict[str, str] = {}
-        for student, system, blanks, slips in zip(
-            self.students, systems, self.blanks, self.mistakes, strict=True
+        pages: dict[str, Manuscript] = {}
+        states = self.states or (None,) * len(systems)
+        for student, system, blanks, slips, state in zip(
+            self.students, systems, self.blanks, self.mistakes, states, strict=True
         ):
             folder = f"{STUDENTS}/{student}"
-            page = sheet(system, blanks, slips, student)
-            found[f"{folder}/exercise.html"] = as_html(page, "Exercise")
-            found[f"{folder}/{HAND_IN}"] = self._hand_in(student, system, blanks)
+            page = pages[student] = sheet(system, blanks, slips, student, state)
+            if state is None:
+                found[f"{folder}/exercise.html"] = as_html(page, "Exercise")
+                found[f"{folder}/{HAND_IN}"] = self._hand_in(student, system, blanks)
+            else:
+                found[f"{folder}/sheet.html"] = as_html(page, "Exam", "exam")
             found[f"{INSTRUCTOR}/{MODELS}/{student}.toml"] = system.to_toml()
-        page = solutions(self.name, systems, self.blanks, self.mistakes, self.students)
+        if self.states:
+            page = together(self.name, pages)
+            found[f"{STUDENTS}/sheets.html"] = as_html(page, "Exam", "exam sheets")
+            names = [item.name for item in self.blanks[0]]
+            lines = [",".join(("sheet", *names)), *(x + "," * len(names) for x in self.students)]
+            found[ANSWERS] = "\n".join(lines) + "\n"
+        page = solutions(self.name, systems, self.blanks, self.mistakes, self.students, self.values)
         found[f"{INSTRUCTOR}/solutions.html"] = as_html(page, "Solutions of")
         blanks_of = {
             student: [{**asdict(item), "question": _question(item, own, system)} for item in own]
             for student, own, system in zip(self.students, self.blanks, systems, strict=True)
         }
-        key = {"format": FORMAT, "name": self.name, "blanks": blanks_of}
+        key: dict[str, Any] = {"format": FORMAT, "name": self.name, "blanks": blanks_of}
+        key |= {"states": dict(zip(self.students, self.states, strict=True))} if self.states else {}
         found[f"{INSTRUCTOR}/{BLANKS}"] = json.dumps(key, indent=1) + "\n"
         return found
 
@@ -141,6 +162,7 @@ def exercise(
     signs: bool = False,
     lengths: bool = False,
     mistakes: bool = False,
+    exam: bool = False,
 ) -> ExerciseKit:
     """Make an exercise: for each student a variant of a mechanism with entries to derive by hand.
 
@@ -164,6 +186,9 @@ def exercise(
         Find the mistake: three Jacobians of constraints are shown, each with one slip, other ones
         for each student. The blanks are its place and the right entry. Free equations, which have
         no variants, may be given too.
+    exam
+        Numbered sheets to be filled on paper: each has a state of its own, at which the entries
+        are asked for as numbers too. What was written is typed into ``answers.csv``.
 
     Returns
     -------
@@ -182,6 +207,8 @@ def exercise(
             f"{getattr(model, 'name', model)} is no mechanism of bodies and joints, which an "
             "exercise needs: it is a system of free equations"
         )
+    if exam and mistakes:
+        raise InputError("an exam has entries to derive, and no mistakes to find; give one of both")
     wanted: Any = students  # whatever its type says
     if not isinstance(wanted, int) or not 1 <= wanted <= MOST_STUDENTS:
         raise InputError(f"{students!r} students: give a number from 1 to {MOST_STUDENTS}")
@@ -190,7 +217,14 @@ def exercise(
         made = [*variants(model, students, seed, Choices(signs, lengths))]
     if not mistakes:
         blanks = choose_blanks(made[0].system(), seed)
-        return ExerciseKit(model.name, (blanks,) * students, tuple(made), ((),) * students)
+        states: Any = ()
+        if exam:
+            sheets = import_module("kincompile.exercises.exam")  # it loads the checker
+            states = [
+                sheets.choose_state(x, blanks, f"{seed}-{k}") for k, x in enumerate(made, start=1)
+            ]
+        of_all = (blanks,) * students, tuple(made), ((),) * students
+        return ExerciseKit(model.name, *of_all, *map(tuple, zip(*states, strict=True)))
     drawing = import_module("kincompile.exercises.mistakes")  # it loads the checker
     slips = [
         drawing.choose_mistakes(x.system(), f"{seed}-{k}") for k, x in enumerate(made, start=1)

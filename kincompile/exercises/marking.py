@@ -9,7 +9,7 @@ import re
 import time
 import traceback
 import warnings
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -19,9 +19,11 @@ from kincompile.checker.comparison import Diagnosis
 from kincompile.checker.judged import UNEXPLAINED
 from kincompile.checker.reference import Reference
 from kincompile.errors import InputError, InternalError, KincompileError
-from kincompile.exercises.blanks import PLACE, Blank
+from kincompile.exercises.blanks import DIGITS, PLACE, Blank, State
+from kincompile.exercises.exam import value_mark
+from kincompile.exercises.gradebooks import read_roster
 from kincompile.exercises.graded import EMPTY, RIGHT, ROUNDED, UNREAD, Mark
-from kincompile.exercises.kit import BLANKS, FORMAT, HAND_IN, INSTRUCTOR, MODELS, STUDENTS
+from kincompile.exercises.kit import ANSWERS, BLANKS, FORMAT, HAND_IN, INSTRUCTOR, MODELS, STUDENTS
 from kincompile.exercises.marks import Marks
 from kincompile.exercises.rounded import Leeway, meant
 from kincompile.files.content import decoded, file_content
@@ -83,10 +85,14 @@ def mark(
     """
     leeway = Leeway(tolerance, digits)
     target = Path(folder)
-    name, key, questions = _key(target)
+    key = _key(target)
+    typed = read_roster(target / ANSWERS, key.blanks) if (target / ANSWERS).exists() else {}
+    if key.states and not tolerance and digits is None:
+        leeway = Leeway(digits=DIGITS)
     found: dict[str, tuple[Mark, ...]] = {}
-    for student, blanks in key.items():
+    for student, blanks in key.blanks.items():
         lines, problem = _lines(target / STUDENTS / student / HAND_IN)
+        lines += [f"{name} = {text}" for name, text in typed.get(student, {}).items() if text]
         answers, unread = _answers(lines)
         marks = {
             item: Mark(item, 0, unread[item.name], UNREAD)
@@ -96,27 +102,39 @@ def mark(
         }
         if answers:
             path = target / INSTRUCTOR / MODELS / f"{student}.toml"
-            marks |= within_budget(partial(_student, path, blanks, answers, leeway), blanks)
+            state = key.states.get(student)
+            work = partial(_student, path, blanks, answers, leeway, state)
+            marks |= within_budget(work, blanks)
         found[student] = tuple(
             replace(
                 item,
                 answer=answers.get(item.blank.name, ""),
-                question=questions[student].get(item.blank.name, ""),
+                question=key.questions[student].get(item.blank.name, ""),
             )
             for item in marks.values()
         )
-    return Marks(target, name, found)
+    return Marks(target, key.name, found)
 
 
 def _student(
-    path: Path, blanks: Sequence[Blank], answers: Mapping[str, str], leeway: Leeway
+    path: Path,
+    blanks: Sequence[Blank],
+    answers: Mapping[str, str],
+    leeway: Leeway,
+    state: State | None,
 ) -> dict[Blank, Mark]:
     reference = Reference(read(path).system())
-    marks = _marked(reference, blanks, answers)
-    for item, found in marks.items():
-        if not found.points and found.is_read and item.quantity != PLACE:
-            marks[item] = _rounding(reference, found, answers[item.name], leeway)
-    return marks
+    found: dict[Blank, Mark] = {}
+    for item in blanks if state is not None else ():
+        answer = answers.get(item.name)
+        value = answer and value_mark(reference, item, answer, state or {}, leeway)
+        if value:
+            found[item] = value
+    marks = _marked(reference, [item for item in blanks if item not in found], answers)
+    for item, own in marks.items():
+        if not own.points and own.is_read and item.quantity != PLACE:
+            marks[item] = _rounding(reference, own, answers[item.name], leeway)
+    return found | marks
 
 
 def _rounding(reference: Reference, found: Mark, answer: str, leeway: Leeway) -> Mark:
@@ -218,8 +236,18 @@ def _memory() -> int:
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
 
 
-def _key(folder: Path) -> tuple[str, dict[str, list[Blank]], dict[str, dict[str, str]]]:
-    """Return the name of an exercise, and of each student the blanks and what they ask."""
+@dataclass(frozen=True, slots=True)
+class _Key:
+    """What an exercise asks each student: blanks, their questions, the states of an exam."""
+
+    name: str
+    blanks: dict[str, list[Blank]]
+    questions: dict[str, dict[str, str]]
+    states: dict[str, State]
+
+
+def _key(folder: Path) -> _Key:
+    """Return what an exercise asks."""
     path = folder / INSTRUCTOR / BLANKS
     try:
         data: Any = json.loads(path.read_text(encoding="utf-8"))
@@ -238,6 +266,10 @@ def _key(folder: Path) -> tuple[str, dict[str, list[Blank]], dict[str, dict[str,
             for student, rows in data["blanks"].items()
         }
         name = str(data.get("name", folder.resolve().name))
+        states = {
+            str(student): {str(name): float(value) for name, value in own.items()}
+            for student, own in data.get("states", {}).items()
+        }
     except OSError as error:
         raise InputError(
             f"{folder} is no exercise: {path} cannot be read; give the folder that "
@@ -254,7 +286,8 @@ def _key(folder: Path) -> tuple[str, dict[str, list[Blank]], dict[str, dict[str,
         raise InputError(
             f"{path} has no blanks of {listed(without)}; write the exercise again with its seed"
         )
-    return name, {student: found[student] for student in students}, questions
+    blanks = {student: found[student] for student in students}
+    return _Key(name, blanks, questions, states)
 
 
 def _lines(path: Path) -> tuple[list[str], str]:

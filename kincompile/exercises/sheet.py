@@ -13,16 +13,16 @@ from kincompile.derivations.assembled import orientation_in_words
 from kincompile.derivations.derivation import constraint_chapters
 from kincompile.derivations.evaluation import evaluation
 from kincompile.derivations.figures import Figures
-from kincompile.exercises.blanks import PLACE
+from kincompile.exercises.blanks import DIGITS, PLACE
 from kincompile.model.resolve import Joint
 from kincompile.names import rate
 from kincompile.report import document as doc
 from kincompile.report import formulas as fm
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-    from kincompile.exercises.blanks import Blank
+    from kincompile.exercises.blanks import Blank, State
     from kincompile.exercises.mistakes import Mistake
     from kincompile.model.system import ConstraintSystem
 
@@ -34,9 +34,13 @@ LINE = "_" * 22
 
 
 def sheet(
-    system: ConstraintSystem, blanks: Sequence[Blank], mistakes: Sequence[Mistake], student: str
+    system: ConstraintSystem,
+    blanks: Sequence[Blank],
+    mistakes: Sequence[Mistake],
+    student: str,
+    state: State | None = None,
 ) -> doc.Manuscript:
-    """Return the page of one student."""
+    """Return the page of one student; with a state a sheet of an exam, to be filled on paper."""
     figures = Figures(evaluation(system, None))
     names, chapters = constraint_chapters(figures)
     given = tuple(
@@ -44,14 +48,44 @@ def sheet(
         for item, constraint in zip(chapters, system.constraints, strict=True)
         if isinstance(constraint, Joint) or mistakes
     )
+    constraints = doc.Chapter("given", ("The constraints",), (), given)
+    if state is not None:
+        parts = (_taker(), _mechanism(figures), constraints, _form(system, blanks, state))
+        summary = f"Sheet {student}. Fill the boxes."
+        return doc.Manuscript(system.name, summary, parts, names)
     parts = (
         _mechanism(figures),
-        doc.Chapter("given", ("The constraints",), (), given),
+        constraints,
         _to_be_found(system, mistakes) if mistakes else _tasks(system, blanks),
         _hints(system, blanks, chapters),
     )
     summary = f"Student {student}. Write the formulas into hand_in.txt, which has a line for each."
     return doc.Manuscript(system.name, summary, parts, names)
+
+
+def together(name: str, sheets: Mapping[str, doc.Manuscript]) -> doc.Manuscript:
+    """Return all sheets of an exam as one page, to be printed."""
+    chapters = tuple(
+        doc.Chapter(
+            f"sheet-{student}",
+            (f"Sheet {student}",),
+            (doc.text(page.summary),),
+            tuple(_of_sheet(item, student) for item in page.sections),
+        )
+        for student, page in sheets.items()
+    )
+    names = {key: glyph for page in sheets.values() for key, glyph in page.abbreviations.items()}
+    return doc.Manuscript(name, f"{len(sheets)} sheets.", chapters, names)
+
+
+def _of_sheet(chapter: doc.Chapter, student: str) -> doc.Chapter:
+    """Return a chapter whose anchors are those of one sheet."""
+    blocks = tuple(
+        replace(item, anchor="") if isinstance(item, doc.Display) else item
+        for item in chapter.blocks
+    )
+    sections = tuple(_of_sheet(item, student) for item in chapter.sections)
+    return replace(chapter, anchor=f"{student}-{chapter.anchor}", blocks=blocks, sections=sections)
 
 
 def solutions(
@@ -60,10 +94,17 @@ def solutions(
     blanks: Sequence[Sequence[Blank]],
     mistakes: Sequence[Sequence[Mistake]],
     students: Sequence[str],
+    values: Sequence[Sequence[str]] = (),
 ) -> doc.Manuscript:
-    """Return the page of the instructor: the right formula of every blank of every student."""
+    """Return the page of the instructor: the right formula of every blank of every student.
+
+    Of an exam `values` are the numbers, as they belong on each sheet.
+    """
     chapters = []
-    for system, own, slips, student in zip(systems, blanks, mistakes, students, strict=True):
+    for k, (system, own, slips, student) in enumerate(
+        zip(systems, blanks, mistakes, students, strict=True)
+    ):
+        numbers = dict(zip(own, values[k], strict=True)) if values else {}
         derived = system.Phi_q, system.gamma
         texts = {item.entry: item.text for item in slips}
         rows: list[tuple[doc.Run | doc.Runs, ...]] = [
@@ -72,11 +113,13 @@ def solutions(
                 doc.Math(_symbol(item, system)),
                 doc.Math(item.answer(*derived)),
                 *((texts[item],) if slips else ()),
+                *((numbers[item],) if numbers else ()),
             )
             for item in own
             if item.quantity != PLACE
         ]
         header = ("blank", "entry", "formula", *(("the slip",) if slips else ()))
+        header = (*header, f"value, {DIGITS} digits") if numbers else header
         shown = doc.table(header, rows)
         chapters.append(doc.Chapter(f"student-{student}", (f"Student {student}",), (shown,)))
     summary = f"{len(systems)} students, {len(blanks[0])} blanks each. Not for students."
@@ -133,6 +176,36 @@ def _tasks(system: ConstraintSystem, blanks: Sequence[Blank]) -> doc.Chapter:
     ]
     shown = doc.table(("blank", "entry", "formula"), rows)
     return doc.Chapter("tasks", ("The blanks",), (note, shown))
+
+
+def _taker() -> doc.Chapter:
+    """Return the boxes for who takes the exam."""
+    boxes = doc.table(("name", "number", "date"), [("", "", "")])
+    return doc.Chapter("taker", ("Who takes the exam",), (boxes,))
+
+
+def _form(system: ConstraintSystem, blanks: Sequence[Blank], state: State) -> doc.Chapter:
+    """Return the state at which numbers are asked for, and boxes for formulas and numbers."""
+    given: list[tuple[doc.Run | doc.Runs, ...]] = [
+        (doc.Verbatim(x.name), f"{state[x.name]:g}", doc.Verbatim(rate(x.name)), f"{own:g}")
+        for x in system.coordinates
+        for own in (state[rate(x.name)],)
+    ]
+    note = doc.text(
+        "Derive each entry, and give its value at this state, at t = ", f"{state['t']:g}", " s, to "
+        f"{DIGITS} significant digits. Angles are in radians. With ",
+        doc.Math(fm.Equated((fm.Joined((fm.PHI_Q, fm.Q_DDOT)), fm.GAMMA))),
+        ", gamma is what stands on the right side of the acceleration equation.",
+    )  # fmt: skip
+    rows: list[tuple[doc.Run | doc.Runs, ...]] = [
+        (doc.Verbatim(item.name), doc.Math(_symbol(item, system)), "", "") for item in blanks
+    ]
+    blocks = (
+        note,
+        doc.table(("coordinate", "value", "rate", "value"), given),
+        doc.table(("blank", "entry", "formula", "value"), rows),
+    )
+    return doc.Chapter("tasks", ("The boxes",), blocks)
 
 
 def _to_be_found(system: ConstraintSystem, mistakes: Sequence[Mistake]) -> doc.Chapter:
