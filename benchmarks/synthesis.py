@@ -2,6 +2,8 @@
 
 ``python -m benchmarks.synthesis`` fits a four-bar to five points with prescribed crank angles, to
 the function y = x^1.5 on 1..4 and to Hoeken's straight line. Limits are the best published errors.
+A four-bar in any place, of ten parameters, is fitted to closed paths from five seeds each, and to
+nine points without times, which only few four-bars meet.
 Five poses of a crank-rocker go to `kc.synthesis` and to pylinkage's `motion_generation`.
 pylinkage's particle swarm gets the same five points, bounds and limits; its positions are those of
 the closed form in plain floats, which is faster than any linkage of its own.
@@ -68,7 +70,7 @@ def four_bar(name: str, **defaults: float) -> kc.Mechanism:
 def row_of(what: str, found: kc.Fit, error: float) -> Row:
     """Return the row of a fit."""
     counts = found.counts
-    evaluations = f"{counts.motions} motions, {counts.gradients} Jacobians, {counts.sampled} sets"
+    evaluations = f"{counts.motions} motions, {counts.sampled} sets"
     return Row(what, error, evaluations, counts.seconds)
 
 
@@ -142,6 +144,75 @@ class Swarm:
         return min(errors)
 
 
+def anywhere(name: str, is_timed: bool) -> kc.Mechanism:
+    """Return a four-bar in any place, with the point P on its coupler; s is where it starts."""
+    m = kc.Mechanism(name, end=2 * math.pi, points=73)
+    names = (*LENGTHS, "u", "v", "x0", "y0", "a", *(("s",) if is_timed else ()))
+    given = (3.7, 1.0, 4.0, 2.7, 1.7, 1.7, 0.0, 0.0, 0.0, 0.0)
+    p = {key: m.parameter(key, value) for key, value in zip(names, given, strict=False)}
+    x, y, r1, a = p["x0"], p["y0"], p["r1"], p["a"]
+    crank, rod = m.body("crank", (0, 0, 0.5)), m.body("rod", (1.7, 1, 0.8))
+    rocker = m.body("rocker", (3.7, 0, 1.9))
+    m.add(kc.Revolute("A", crank, (0, 0), m.ground, (x, y)))
+    m.add(kc.Revolute("B", crank, (p["r2"], 0), rod, (0, 0)))
+    m.add(kc.Revolute("C", rod, (p["r3"], 0), rocker, (p["r4"], 0)))
+    end = x + r1 * sympy.cos(a), y + r1 * sympy.sin(a)
+    m.add(kc.Revolute("D", rocker, (0, 0), m.ground, end))
+    m.add(kc.AbsoluteAngle("motor", crank, kc.t + p.get("s", 0)))
+    m.point("P", rod, (p["u"], p["v"]))
+    return m
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A published path: its points, whether the crank turns equally between them, bounds."""
+
+    name: str
+    points: Any
+    is_timed: bool
+    lengths: tuple[float, float]
+    places: tuple[float, float]
+    best: float  # the best error that is known to us
+    options: dict[str, int] | None = None
+
+    def fitted(self, seed: int) -> kc.Fit:
+        """Return a fit of a four-bar in any place."""
+        turn = (0.0, 2 * math.pi)
+        bounds = dict.fromkeys(LENGTHS, self.lengths) | {"a": turn}
+        bounds |= dict.fromkeys(("u", "v", "x0", "y0"), self.places)
+        steps = 2 * math.pi * np.arange(len(self.points)) / len(self.points)
+        target = kc.targets.path("P", self.points, steps if self.is_timed else None)
+        has_start = self.is_timed or self.options is not None
+        if has_start:
+            bounds["s"] = turn
+        model = anywhere("any_four_bar", has_start)
+        return kc.fit(model, target, bounds=bounds, seed=seed, **(self.options or {}))
+
+
+CLOSED = (
+    (0.5, 1.1), (0.4, 1.1), (0.3, 1.1), (0.2, 1.0), (0.1, 0.9), (0.05, 0.75), (0.02, 0.6),
+    (0.0, 0.5), (0.0, 0.4), (0.03, 0.3), (0.1, 0.25), (0.15, 0.2), (0.2, 0.3), (0.3, 0.4),
+    (0.4, 0.5), (0.5, 0.7), (0.6, 0.9), (0.6, 1.0),
+)  # fmt: skip
+LINE = tuple((20.0, 20.0 + 5 * k) for k in range(6))
+ELLIPSE = (
+    (20, 10), (17.66, 15.142), (11.736, 17.878), (5, 16.928), (0.60307, 12.736),
+    (0.60307, 7.2638), (5, 3.0718), (11.736, 2.1215), (17.66, 4.8577), (20, 10),
+)  # fmt: skip
+NINE = (
+    (0.25, 0), (0.52, 0.1), (0.8, 0.7), (1.2, 1.0), (1.4, 1.3), (1.1, 1.48), (0.7, 1.4),
+    (0.2, 1.0), (0.02, 0.4),
+)  # fmt: skip
+CASES = (
+    Case("18 points, closed", CLOSED, True, (0.05, 50), (-50, 50), 0.0090289),
+    Case("6 points on a line", LINE, False, (5, 60), (-60, 60), 1e-12),
+    Case("10 points of an ellipse", ELLIPSE, False, (5, 80), (-80, 80), 0.0034),
+)
+NINE_POINTS = Case(
+    "9 points", NINE, False, (0.1, 5), (-5, 5), 1e-8, {"samples": 24576, "starts": 128}
+)
+
+
 def swarm() -> Row:
     """Let pylinkage's optimizer, with its own settings, look for the five points."""
     require(optional("pylinkage"), "pylinkage")
@@ -204,7 +275,16 @@ def main() -> None:
     heads_of_five = ("five poses", "four-bars", "work", "off the poses", "s")
     print_table("Five poses of a crank-rocker, crank at 10 to 150 degrees", heads_of_five, five)
     print_table("Function and straight line", heads, (row.cells() for row in others))
+    runs = [(case, seed, case.fitted(seed)) for case in CASES for seed in range(5)]
+    runs.append((NINE_POINTS, 0, NINE_POINTS.fitted(0)))
+    paths = [row_of(f"{case.name}, seed {seed}", found, found.error) for case, seed, found in runs]
+    print_table("A four-bar in any place", heads, (row.cells() for row in paths))
     targets = [
+        *(
+            Target(f"{case.name}, worst seed", max(own), "at most", case.best)
+            for case in (*CASES, NINE_POINTS)
+            if (own := [found.error for one, _, found in runs if one is case])
+        ),
         Target("five points, sum of squares", ours.error, "at most", BEST_PATH * (1 + 1e-9)),
         Target("function, largest error", others[0].error, "at most", BEST_FUNCTION, "deg"),
         Target("line, deviation by length", others[1].error, "at most", BEST_LINE),

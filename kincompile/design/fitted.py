@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +13,7 @@ from kincompile.design.demands import Extremes, compared, deviation, orders_of, 
 from kincompile.design.variation import with_values
 from kincompile.errors import KincompileWarning
 from kincompile.html import Shown, table_html
+from kincompile.names import listed
 from kincompile.runtime.solve import solve
 from kincompile.tables import counted, indented, table
 
@@ -32,6 +33,7 @@ FINELY = 4
 """Parts of each step of the grid at which limits are judged in the end."""
 
 REACHED = ("target", "t", "wanted", "got", "off")
+DESIGNS = ("design", "error", "size")
 KEPT = ("limit", "from", "to", "least", "greatest")
 DIMENSIONS = ("parameter", "value", "unit", "before")
 
@@ -46,6 +48,7 @@ class Counts:
     motions: int
     gradients: int
     seconds: float
+    is_cut: bool = False  # whether the budget was spent before the end of the search
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +105,12 @@ class Fit(Shown):
         What they were.
     error : float
         The sum of squares of the weighted deviations.
-    errors : tuple of float
-        That of every start whose end keeps the limits, the least first.
-    outside : tuple of float
-        That of every other start, the least first.
+    others : tuple of Fit
+        The next best designs, each unlike the others.
+    dropped : dict
+        How many ends were dropped for a defect: of ``"order"``, where the points do not come within
+        one cycle; of ``"circuit"``, where the motion stops between them; of ``"branch"``, where it
+        arrives at another position.
     reached : tuple of Reached
         Every wanted value.
     limits : tuple of Kept
@@ -125,19 +130,36 @@ class Fit(Shown):
     before: dict[str, float]
     units: dict[str, str]
     error: float
-    errors: tuple[float, ...]
-    outside: tuple[float, ...]
     reached: tuple[Reached, ...]
     limits: tuple[Kept, ...]
     motion: Solution
     counts: Counts
+    others: tuple[Fit, ...] = ()
+    dropped: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def errors(self) -> tuple[float, ...]:
+        """The errors of this design and of the others that keep the limits, the least first."""
+        return tuple(sorted(item.error for item in self._designs if item.keeps_limits))
+
+    @property
+    def outside(self) -> tuple[float, ...]:
+        """The errors of those that exceed limits, the least first."""
+        return tuple(sorted(item.error for item in self._designs if not item.keeps_limits))
+
+    @property
+    def _designs(self) -> tuple[Fit, ...]:
+        return (self, *self.others)
+
+    @property
+    def keeps_limits(self) -> bool:
+        """Whether all limits hold."""
+        return all(item.holds for item in self.limits)
 
     @property
     def success(self) -> bool:
         """Whether all is as near as was asked, within all limits."""
-        return all(item.is_near for item in self.reached) and all(
-            item.holds for item in self.limits
-        )
+        return all(item.is_near for item in self.reached) and self.keeps_limits
 
     @property
     def message(self) -> str:
@@ -196,16 +218,68 @@ class Fit(Shown):
             for item in self.limits
         ]  # fmt: skip
 
+    @property
+    def size(self) -> float:
+        """The diagonal of the box that all origins and points move in, over the motion [length]."""
+        names = (*self.motion.coordinates, *self.motion.observed.names)
+        spans = [
+            max((np.ptp(self.motion[name]) for name in names if name.startswith(axis)), default=0.0)
+            for axis in ("x_", "y_", "z_")
+        ]
+        return float(np.linalg.norm(spans))
+
+    @property
+    def front(self) -> tuple[Fit, ...]:
+        """The designs, this one first, that no other surpasses in all: Pareto's front.
+
+        Criteria are the error, the size, and how far each limit is kept, as a transmission angle.
+        """
+        return tuple(
+            one
+            for one in self._designs
+            if not any((other.criteria <= one.criteria).all() for other in self._surpassing(one))
+        )
+
+    def _surpassing(self, one: Fit) -> list[Fit]:
+        return [x for x in self._designs if x is not one and (x.criteria < one.criteria).any()]
+
+    @property
+    def criteria(self) -> NDArray[np.float64]:
+        """Error, size, and the negative of what is left to each limit: the less, the better."""
+        left = [min(x.least - x.low, x.high - x.greatest) for x in self.limits]
+        return np.array([self.error, self.size, *(-x for x in left)])
+
+    def designs_titles(self) -> tuple[str, ...]:
+        """Return the titles of the table of designs."""
+        limits = (f"{item.title}, least to greatest" for item in self.limits)
+        return (*DESIGNS, *limits, *self.parameters, "front")
+
+    def designs(self) -> list[tuple[str, ...]]:
+        """Return the rows of a table of this design and the others."""
+        front = {id(item) for item in self.front}
+        return [
+            (
+                str(number), f"{item.error:.6g}", f"{item.size:.4g}",
+                *(f"{x.least:.4g} to {x.greatest:.4g}" for x in item.limits),
+                *(f"{value:.5g}" for value in item.parameters.values()),
+                "yes" if id(item) in front else "",
+            )
+            for number, item in enumerate(self._designs, 1)
+        ]  # fmt: skip
+
     def effort(self) -> str:
         """Return what it took, in a sentence."""
         counts = self.counts
-        errors = self.errors or self.outside
-        ends = sum(error <= 1.01 * errors[0] + 1e-30 for error in errors)
-        return (
-            f"Sum of squares {self.error:.6g}, from {counted(ends, 'start')} of {counts.starts}; "
-            f"{counts.sampled} sets searched, {counted(counts.motions, 'motion')} and "
-            f"{counted(counts.gradients, 'Jacobian')} in {counts.seconds:.2f} s."
-        )
+        dropped = [f"{count} of {kind}" for kind, count in self.dropped.items() if count]
+        parts = [
+            f"Sum of squares {self.error:.6g}; {counts.sampled} sets searched, {counts.starts} "
+            f"followed to the end, {counted(counts.motions, 'motion')} in {counts.seconds:.2f} s."
+        ]
+        if counts.is_cut:
+            parts.append("The search ended with its budget.")
+        if dropped:
+            parts.append(f"Dropped for defects: {listed(dropped)}.")
+        return " ".join(parts)
 
     def to_text(self) -> str:
         """Return dimensions, targets and limits as tables."""
@@ -214,6 +288,9 @@ class Fit(Shown):
         lines += ["", *indented(table(REACHED, self.targets(), right=REACHED[1:]))]
         if self.limits:
             lines += ["", *indented(table(KEPT, self.kept(), right=KEPT[1:]))]
+        if self.others:
+            titles = self.designs_titles()
+            lines += ["", *indented(table(titles, self.designs(), right=titles[:-1]))]
         return "\n".join(lines)
 
     def to_html(self) -> str:
@@ -225,6 +302,9 @@ class Fit(Shown):
         ]
         if self.limits:
             parts.append(table_html("limits", "over the motion", KEPT, self.kept()))
+        if self.others:
+            said = "and others; on the front no other is better in all"
+            parts.append(table_html("designs", said, self.designs_titles(), self.designs()))
         return "\n".join(parts)
 
     def _repr_html_(self) -> str:
@@ -237,10 +317,9 @@ def fitted(
     best: Trial,
     names: Sequence[str],
     counts: Counts,
-    ends: Sequence[Trial],
     allowed: float,
 ) -> Fit:
-    """Return the result of a fit from its best trial, and the ends of all its starts."""
+    """Return the result of a fit from a trial."""
     values = dict(zip(names, best.x.tolist(), strict=False))
     before = {item.name: item.default for item in model.system().parameters}
     changed = _on_branch(model, values, best.motion)
@@ -250,8 +329,6 @@ def fitted(
         {name: float(before[name] or 0.0) for name in names},
         {item.name: item.unit for item in model.parameters},
         best.error,
-        tuple(sorted(end.error for end in ends if end.excess <= allowed)),
-        tuple(sorted(end.error for end in ends if end.excess > allowed)),
         tuple(_reached(demands, best, len(names))),
         tuple(_kept(demands, best, allowed)),
         best.motion,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from kincompile.report.plot import Layer, plot_svg
 from kincompile.report.to_html import as_html
 from kincompile.runtime.results.columns import titled
 from kincompile.runtime.solve import solve
+from kincompile.view.gallery import Drawn, side_by_side
 from kincompile.view.page import page
 
 if TYPE_CHECKING:
@@ -28,6 +30,11 @@ if TYPE_CHECKING:
 
 WANTED: dict[str, Any] = {"colour": "var(--numeric)", "name": "wanted"}
 """How a plot shows what was wanted."""
+
+ON_FRONT: dict[str, Any] = {"colour": "var(--numeric)", "name": "on the front"}
+"""How a plot shows the designs that no other surpasses in all."""
+
+FRONT = "On the front are the designs that no other surpasses in all: error, size and limits."
 
 HEIGHT = "900px"
 """Of the page of a mechanism within the page of its fit."""
@@ -58,6 +65,9 @@ def fit_page(found: Fit) -> str:
     ]
     if found.limits:
         chapters.append(Chapter("limits", ("Limits",), (table(KEPT, found.kept()),)))
+    if found.others:
+        rows = table(found.designs_titles(), found.designs())
+        chapters.append(Chapter("designs", ("Designs",), (text(FRONT), rows)))
     name, model = found.model.name, found.model
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", KincompileWarning)  # the fit has said them
@@ -65,7 +75,30 @@ def fit_page(found: Fit) -> str:
     plots = "\n".join((*_over_time(found, motion), *_paths(found, motion)))
     moving = f"<h2>{name}</h2>{framed_html(page(model, motion).html, name, HEIGHT)}"
     manuscript = Manuscript(name, found.message, tuple(chapters))
-    return as_html(manuscript, "Synthesis of", after=f"<p>{plots}</p>{moving}")
+    beside = _side_by_side(found) if found.others else ""
+    return as_html(manuscript, "Synthesis of", after=f"<p>{plots}</p>{beside}{moving}")
+
+
+def _side_by_side(found: Fit) -> str:
+    """Return the designs as they move, in one scale, and the errors and sizes of all."""
+    designs, shown = (found, *found.others), []
+    for number, item in enumerate(designs, 1):
+        module = compile_model(item.model)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", KincompileWarning)
+            motion = solve(module, np.linspace(0, item.model.end, item.model.points))
+        said = f"error {item.error:.4g}, size {item.size:.4g}"
+        guess = np.array(module.GUESS)
+        shown.append(Drawn(f"Design {number}", said, item.model.system(), motion, guess))
+    name = f"Designs of {escape(found.model.name)}"
+    layers = [
+        Layer("dots", np.array([x.size for x in some]), np.array([x.error for x in some]), **how)
+        for some, how in ((designs, {}), (found.front, ON_FRONT))
+    ]
+    plot = plot_svg(
+        "Error and size of the designs", titled("size", found.model.length_unit), "error", layers
+    )
+    return f"<h2>Designs</h2><p>{plot}</p>{framed_html(side_by_side(name, shown), name, HEIGHT)}"
 
 
 def _over_time(found: Fit, motion: Solution) -> Iterator[str]:

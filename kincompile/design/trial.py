@@ -14,16 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
-from kincompile.design.demands import (
-    ORDERS,
-    Extremes,
-    compared,
-    deviation,
-    orders_of,
-    sides,
-    turning,
-)
+from kincompile.design.demands import ORDERS
+from kincompile.design.rows import Motions
 from kincompile.errors import KincompileWarning
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.follow import follow
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.results.sensitivities import sensitivities
@@ -35,7 +29,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from kincompile.design.columns import Column
     from kincompile.design.demands import Demands
     from kincompile.runtime.results.sensitivities import Sensitivities
     from kincompile.runtime.results.solution import Solution
@@ -45,8 +38,8 @@ if TYPE_CHECKING:
 EAGERNESS = 10.0
 """Factor of what limits are exceeded by, among the deviations."""
 
-SLACK = 1e-9
-"""Part of all time that counts as none."""
+EXCESS = 1e-7
+"""Part of a limit by which it may be exceeded."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +55,17 @@ class Trial:
     def error(self) -> float:
         """The sum of squares of the weighted deviations."""
         return float(self.residuals @ self.residuals)
+
+    @property
+    def largest(self) -> float:
+        """The largest weighted deviation."""
+        return float(np.abs(self.residuals).max())
+
+    @property
+    def cost(self) -> float:
+        """The error, with what limits are exceeded by."""
+        over = np.minimum(self.gaps, 0.0)
+        return self.error + EAGERNESS**2 * float(over @ over)
 
     @property
     def excess(self) -> float:
@@ -103,120 +107,41 @@ class Workbench:
             motion = solution_of(inputs, points, outcome)
         if branch is not None and not np.array_equal(motion.branch[0], branch):
             return None
-        residuals = np.concatenate([part for part, _, _ in self._rows(motion, instants, None)])
-        gaps = [part for part, _, _ in self._gap_rows(motion, instants, None)]
-        trial = Trial(x, motion, residuals, np.concatenate([*gaps, np.empty(0)]))
-        return trial if np.isfinite(residuals).all() and np.isfinite(trial.gaps).all() else None
+        seen = self._seen(motion, instants)
+        (residuals,), (gaps,) = seen.rows()[0], seen.gaps()[0]
+        trial = Trial(x, motion, residuals, gaps)
+        return trial if np.isfinite(residuals).all() and np.isfinite(gaps).all() else None
+
+    def sets(self, x: Array) -> Array:
+        """Return the values of all parameters (B, k) at variables (B, nx)."""
+        p, place = code_of(self.module).defaults.copy(), self.module.PARAMETERS.index
+        for name, value in self.fixed.items():
+            p[place(name)] = value
+        sets = np.repeat(p[np.newaxis], len(x), axis=0)
+        sets[:, [place(name) for name in self.names]] = x[:, : len(self.names)]
+        return sets
 
     def derivatives(self, trial: Trial) -> tuple[Array, Array]:
         """Return the derivatives of residuals (R, nx) and of gaps (G, nx)."""
         self.gradients += 1
         found = sensitivities(trial.motion, self.names, self.demands.columns)
-        instants = self.demands.instants(trial.x[len(self.names) :])
-        parts = []
-        for rows in (self._rows, self._gap_rows):
-            made = [
-                np.concatenate((by_p, by_t), axis=1)
-                for _, by_p, by_t in rows(trial.motion, instants, found)
-            ]
-            parts.append(np.concatenate([*made, np.empty((0, trial.x.size))]))
-        return parts[0], parts[1]
+        seen = self._seen(trial.motion, self.demands.instants(trial.x[len(self.names) :]), found)
+        (by,), (gaps_by,) = (np.asarray(part[1]) for part in (seen.rows(), seen.gaps()))
+        return by, gaps_by
 
-    def _rows(self, motion: Solution, instants: list[Array], found: Sensitivities | None) -> Any:
-        """Yield deviations, their derivatives by parameters, and by variables that are times."""
-        first = 0
-        for (target, columns), at in zip(self.demands.passing, instants, strict=True):
-            places = np.searchsorted(motion.t, at)
-            is_free = target.times is None
-            for k, column in enumerate(columns):
-                weight = float(target.weights[k])
-                off = deviation(target.values[:, k], column, motion[column.name][places])
-                by_p = by_t = off[:, np.newaxis][:, :0]
-                if found is not None:
-                    by_p = weight * self._by_parameters(found, column)[0, places]
-                    by_t = np.zeros((at.size, len(self.demands.time_bounds())))
-                if found is not None and is_free:
-                    rates = weight * orders_of(motion, column)[1, places]
-                    by_t[:, first : first + at.size] = np.tril(
-                        np.repeat(rates[:, None], at.size, 1)
-                    )
-                yield weight * off, by_p, by_t
-            first += at.size if is_free else 0
-        for shape, columns in self.demands.shaped:
-            places = np.searchsorted(motion.t, shape.times)
-            values = np.column_stack([motion[item.name][places] for item in columns])
-            slopes = None
-            if found is not None:
-                parts = [self._by_parameters(found, item)[0, places] for item in columns]
-                slopes = np.stack(parts, axis=1)
-            off, by_p = compared(shape, values, slopes)
-            yield off, by_p, np.zeros((off.size, len(self.demands.time_bounds())))
-        for ratio, column in self.demands.ratios:
-            yield self._ratio(motion, ratio, column, found)
+    def _seen(
+        self, motion: Solution, instants: list[Array], found: Sensitivities | None = None
+    ) -> Motions:
+        """Return the columns of a motion, as the targets ask for them."""
 
-    def _by_parameters(self, found: Sensitivities, column: Column) -> Array:
-        """Return the derivatives of a column and its rates, (3 - order, N, parameters)."""
-        names = [column.of + suffix for suffix in ORDERS[column.order :]]
-        return np.array([[found[x, name] for name in self.names] for x in names]).swapaxes(1, 2)
+        def slope(name: str, order: int) -> Array:
+            assert found is not None
+            of = name + ORDERS[order]
+            return np.array([found[of, parameter] for parameter in self.names]).T[np.newaxis]
 
-    def _ratio(
-        self, motion: Solution, target: Any, column: Column, found: Sensitivities | None
-    ) -> tuple[Array, Array, Array]:
-        """Return the deviation of a time ratio, and its derivatives."""
-        grid = self.demands.grid
-        on_grid = np.searchsorted(motion.t, grid)
-        y, rate, second = orders_of(motion, column)[:, on_grid]
-        ends = []
-        for sign in (1.0, -1.0):
-            zeros = turning(grid, rate, second, sign)
-            if not zeros:
-                nothing = np.zeros((1, len(self.names)))
-                times = np.zeros((1, len(self.demands.time_bounds())))
-                return np.array([np.nan]), nothing, times
-            ends.append(max(zeros, key=lambda item: sign * y[item.cell]))
-        top, bottom = ends
-        whole = grid[-1] - grid[0]
-        rise = (top.t - bottom.t) % whole
-        ratio = rise / (whole - rise)
-        by_p = np.zeros((1, len(self.names)))
-        if found is not None:
-            slopes = self._by_parameters(found, column)[1:, on_grid]
-            by_rise = whole / (whole - rise) ** 2
-            for item, sign in ((top, 1.0), (bottom, -1.0)):
-                cell = slice(item.cell, item.cell + 2)
-                values = np.concatenate((slopes[0][cell], slopes[1][cell]))
-                by_p += sign * by_rise * (item.weights @ values)
-        by_t = np.zeros((1, len(self.demands.time_bounds())))
-        return target.weight * np.array([ratio - target.ratio]), target.weight * by_p, by_t
-
-    def _gap_rows(
-        self, motion: Solution, instants: list[Array], found: Sensitivities | None
-    ) -> Any:
-        """Yield what is left to limits, with derivatives as `_rows` does."""
-        on_grid = np.searchsorted(motion.t, self.demands.grid)
-        times = len(self.demands.time_bounds())
-        for item, column, is_constant in self.demands.limits:
-            places = np.zeros(1, dtype=np.intp) if is_constant else on_grid
-            orders, by_p = orders_of(motion, column)[:, places], None
-            if found is not None:
-                by_p = self._by_parameters(found, column)[:, places]
-            for side in sides(item):
-                extremes = Extremes(motion.t[places], orders, side.sign)
-                gap = side.left(extremes.of(orders))
-                if by_p is None:
-                    yield gap, np.zeros((gap.size, 0)), np.zeros((gap.size, 0))
-                else:
-                    yield gap, side.factor * extremes.of(by_p), np.zeros((gap.size, times))
-        first = 0
-        for (begin, end), (target, _) in zip(self.demands.free, self.demands.untimed, strict=True):
-            count = len(target.values)
-            at = next(
-                at
-                for (own, _), at in zip(self.demands.passing, instants, strict=True)
-                if own is target
-            )
-            by_t = np.zeros((1, times))
-            by_t[0, first : first + count] = -1 / (end - begin)
-            first += count
-            gap = np.array([(end - at[-1]) / (end - begin) + SLACK])
-            yield gap, np.zeros((1, len(self.names))), by_t
+        return Motions(
+            self.demands, motion.t[np.newaxis], np.searchsorted(motion.t, self.demands.grid),
+            [np.searchsorted(motion.t, at)[np.newaxis] for at in instants],
+            lambda name, order: motion[name + ORDERS[order]][np.newaxis],
+            None if found is None else slope,
+        )  # fmt: skip

@@ -2,7 +2,7 @@
 
     @declared
     class Fit:
-        samples: int = given(whole(1, 2**20), "Sets of parameters that are searched.", default=1024)
+        samples: int = given(whole(1, 2**20), "Sets of parameters that are searched.", default=4096)
 
 A kind is a fragment of JSON Schema. The schema of a file, its reader, the checks of arguments,
 options of the command line and the tables of docs/model_tables.md follow from the declaration.

@@ -118,10 +118,10 @@ class Fit:
     )
     targets: Sequence[Any] = given(kind.tables("target"), "What the mechanism is to do.")
     samples: int = given(
-        kind.whole(1, 2**20), "Sets of parameters that are searched.", default=1024
+        kind.whole(1, 2**20), "Sets of parameters that are searched.", default=4096
     )
     starts: int = given(
-        kind.whole(1, 10_000), "How many of them are followed to the end.", default=16
+        kind.whole(1, 10_000), "How many of them are followed to the end.", default=64
     )
     search: str = given(
         kind.one_of(("sobol", "differential evolution")),
@@ -132,6 +132,17 @@ class Fit:
         kind.one_of(("SLSQP", "trust-constr")), "The solver of a fit with limits.", default="SLSQP"
     )
     seed: int = given(kind.whole(0, LARGEST_SEED), "Seed of the search.", default=0)
+    norm: str = given(
+        kind.one_of(("squares", "maximum")),
+        "What is least in the end: the sum of squares, or the largest deviation.",
+        default="squares",
+    )
+    seconds: int | None = given(
+        kind.whole(1, 10**9), "Time that the search may take [s].", default=None
+    )
+    evaluations: int | None = given(
+        kind.whole(1, 10**12), "Motions that the search may follow.", default=None
+    )
 
 
 _ROWS = kind.array(kind.array(kind.CONSTANT) | {"description": "a list of numbers"}) | {

@@ -150,18 +150,34 @@ def assembly_gallery(
     positions = assemblies(module, t, p)
     times = t + np.linspace(0, system.end, system.points)
     shown = []
-    for guess in positions:
+    for k, guess in enumerate(positions, 1):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", KincompileWarning)  # each card says how it went
             solution = solve(module, times, p, guess)
-        data = _moving(system, solution, guess)
-        last = "the end" if solution.success else f"t = {data['arrays']['t'][-1]:g}"
-        shown.append((data, f"moves to {last}"))
-    _in_one_frame([data for data, _ in shown])
-    cards = [_card(data, f"Assembly {k}", said) for k, (data, said) in enumerate(shown, 1)]
+        good = max(1, int(np.count_nonzero(solution.good)))
+        last = "the end" if solution.success else f"t = {solution.t[good - 1]:g}"
+        shown.append(Drawn(f"Assembly {k}", f"moves to {last}", system, solution, guess))
     title = f"Assemblies of {escape(system.name)} at t = {t:g}"
-    page = _filled(title, cards, {dimension_of(system)})
-    return AssemblyGallery(module, positions, page)
+    return AssemblyGallery(module, positions, side_by_side(title, shown))
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A motion on a page of several: its name, what is written below it, where it is assembled."""
+
+    name: str
+    said: str
+    system: ConstraintSystem
+    solution: Solution
+    assembly: NDArray[np.float64]
+
+
+def side_by_side(title: str, shown: Sequence[Drawn]) -> str:
+    """Return a page that draws motions side by side in one scale, each as far as it was found."""
+    every = [_moving(item.system, item.solution, item.assembly) for item in shown]
+    _in_one_frame(every)
+    cards = [_card(data, x.name, x.said) for data, x in zip(every, shown, strict=True)]
+    return _filled(title, cards, {dimension_of(item.system) for item in shown})
 
 
 def _in_one_frame(shown: Sequence[dict[str, Any]]) -> None:

@@ -216,7 +216,8 @@ def sensitivities(
     columns = (*code.coordinates, *code.outputs)
     if of is not None:
         columns = _columns(names_of(of, "of"), code)
-    found = _Asked(code, names, columns, second).over(solution)
+    found = _Asked(code, names, columns, second).over(Points.of(solution))
+    found = found.reshape(*found.shape[:3], *solution.q.shape[:-1])
     found, pairs = found[:, : len(names)], found[:, len(names) :]
     size = len(set(columns) & set(code.coordinates))
     parts = found[:, :, :size], found[:, :, size:]
@@ -232,6 +233,21 @@ def sensitivities(
         dict(code.units),
         _symmetric(pairs, len(names)) if second else None,
     )
+
+
+def slopes_of(
+    code: Compiled, names: tuple[str, ...], columns: Sequence[str], points: Points
+) -> Array:
+    """Return derivatives of columns by parameters at points, (3, k, columns, L).
+
+    The columns come in the order of the coordinates, then of the outputs. They are NaN where the
+    planned elimination cannot be trusted.
+    """
+    asked = _Asked(code, names, _columns(tuple(columns), code), False)
+    with np.errstate(all="ignore"):
+        found, is_trusted = asked.by_plan(points)
+    found[..., ~is_trusted] = np.nan
+    return found
 
 
 def _symmetric(pairs: Array, count: int) -> Array:
@@ -269,21 +285,21 @@ class _Asked:
     columns: tuple[str, ...]
     second: bool
 
-    def over(self, solution: Solution) -> Array:
-        """Return derivatives of columns and their rates, shape (3, k, columns, ..., N).
+    def over(self, points: Points) -> Array:
+        """Return derivatives of columns and their rates, shape (3, k, columns, L).
 
         Those by pairs of parameters come after those by one.
         """
-        points, k = Points.of(solution), len(self.names)
+        k = len(self.names)
         finite = np.isfinite(points.q_dot.sum(axis=0))
         if self.code.redundant and finite.any():
             some = np.flatnonzero(finite)
             self._require_agreement(points.at(some[:: max(1, some.size // WITNESSES)]))
         with np.errstate(all="ignore"):
-            found, is_trusted = self._by_plan(points)
+            found, is_trusted = self.by_plan(points)
             # A pivot of a generic state may vanish wherever the equations are met.
             for own, some_points in points.parts(finite & ~is_trusted):
-                found[..., own], is_trusted[own] = self._by_plan(some_points, is_near=True)
+                found[..., own], is_trusted[own] = self.by_plan(some_points, is_near=True)
             for own, some_points in points.parts(finite & ~is_trusted):
                 found[:, :k, :, own] = self._by_matrices(some_points)
                 found[:, k:, :, own] = np.nan
@@ -293,7 +309,7 @@ class _Asked:
         if not accelerated.all():  # a corner of a driver
             size = sum(name in self.code.coordinates for name in self.columns)
             found[2, :, :size, ~accelerated] = np.nan
-        return found.reshape(*found.shape[:3], *solution.q.shape[:-1])
+        return found
 
     def _require_agreement(self, points: Points) -> None:
         """Refuse parameters that would take apart a mechanism with redundant equations."""
@@ -309,7 +325,7 @@ class _Asked:
                 "together."
             )
 
-    def _by_plan(self, points: Points, *, is_near: bool = False) -> tuple[Array, NDArray[np.bool_]]:
+    def by_plan(self, points: Points, *, is_near: bool = False) -> tuple[Array, NDArray[np.bool_]]:
         """Return the derivatives by the planned elimination, and where that can be trusted.
 
         Its pivots are those of a generic state, or of the position at the start.

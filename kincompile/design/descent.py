@@ -1,0 +1,405 @@
+"""Many starts of a fit at once, each followed to a minimum by least squares of its own.
+
+starts  -> Batch     motions, each solved at its own times alone, from the positions of before
+Placing -> Batch     moved, turned and scaled as a whole to where targets are, where that can be
+Batch   -> steps     of Levenberg and Marquardt, damped as Nielsen (1999) does
+linear  -> Batch     parameters on which targets depend linearly have their best values in every
+                     trial: variable projection (Golub, Pereyra 1973)
+
+All points of all motions are one batch. Determinants keep their signs, so that no point leaves its
+branch; whether the mechanism gets from one point to the next is seen when the end is judged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.criteria import TOLERANCE
+from kincompile.design.designs import Designs
+from kincompile.design.placing import Placing, best_places
+from kincompile.design.rows import Motions
+from kincompile.design.trial import EAGERNESS
+from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.engine.linear import Planned
+from kincompile.runtime.march import March, all_hold
+from kincompile.runtime.problem import problem
+from kincompile.runtime.results.observed import Points, observed
+from kincompile.runtime.results.sensitivities import slopes_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from kincompile.design.trial import Workbench
+    from kincompile.design.variables import Variables
+
+    Array = NDArray[np.float64]
+    Mask = NDArray[np.bool_]
+
+CORRECTIONS = 6
+"""Of Newton's method, for a trial; one that takes more is too far from the trial before."""
+
+ITERATIONS = 300
+"""Steps of a start, at most."""
+
+KEPT = {8: 4.0, 20: 2.0, 40: 1.0, 80: 0.25}
+"""After how many steps the best are kept, in parts of the starts that are followed. Others are left
+out, and in the end stay where they are."""
+
+FEWEST = 8
+"""Starts that are kept, at least."""
+
+SETTLED = 1e-13
+"""Relative change of the error at which a start has come to its end."""
+
+WITNESSES = 24
+"""Motions from which it is seen which parameters are linear, and which move the whole."""
+
+PROBE = 1e-3
+"""Part of the bounds by which a parameter is changed for that."""
+
+SAME = 1e-10
+"""Part of the largest singular value of derivatives up to which one counts as zero."""
+
+LINEAR = 1e-8
+"""Part of the largest derivative within which derivatives are the same."""
+
+
+@dataclass(slots=True, eq=False)
+class Batch:
+    """Motions of B sets of variables at N times each."""
+
+    x: Array  # (B, nx)
+    t: Array  # (B, N)
+    # (B, N, n) each
+    q: Array
+    q_dot: Array
+    q_ddot: Array
+    signs: Array  # (B, N, blocks): of the determinants
+    good: Mask  # (B,): where all points were found
+
+    def some(self, which: Any) -> Batch:
+        """Return some of them."""
+        return Batch(*(getattr(self, name)[which] for name in self.__slots__))
+
+    def put(self, which: Any, other: Batch) -> None:
+        """Take others in the places of some."""
+        for name in self.__slots__:
+            getattr(self, name)[which] = getattr(other, name)
+
+
+@dataclass(slots=True, eq=False)
+class Descent:
+    """Follows many starts."""
+
+    bench: Workbench
+    variables: Variables
+    motions: int = 0  # how many were solved
+    _linear: tuple[int, ...] | None = field(default=None, init=False)
+
+    def solved(self, x: Array, q: Array, signs: Array | None = None) -> Batch:
+        """Solve motions (B, nx) from positions nearby (B, N, n), on the branch of signs."""
+        code, t, sets = code_of(self.bench.module), self._times(x), self.bench.sets(x)
+        count, steps, n = q.shape
+        lanes = np.ascontiguousarray(np.repeat(sets, steps, axis=0).T)
+        flat = np.ascontiguousarray(q.reshape(-1, n).T)
+        self.motions += count
+        with np.errstate(all="ignore"):
+            equations = problem(code, sets[0], q[0, 0], float(t[0, 0]))
+            march = March(equations, Planned(code, lanes), TOLERANCE)
+            found = march.correct_together(flat, t.ravel(), CORRECTIONS)
+            state, checks = march.complete(found.point)
+        good = np.reshape(all_hold(found.good, checks), (count, steps))
+        now = np.sign(state.determinants).T.reshape(count, steps, -1)
+        if signs is not None:
+            good = good & (now == signs).all(axis=2)
+        states = state.point.q, state.q_dot, state.q_ddot
+        q, q_dot, q_ddot = (part.T.reshape(count, steps, n) for part in states)
+        return Batch(x, t, q, q_dot, q_ddot, now, np.asarray(good.all(axis=1)))
+
+    def _times(self, x: Array) -> Array:
+        """Return the times of motions, (B, N): those of the grid, then of each passing target."""
+        demands = self.bench.demands
+        own = [demands.instants(row) for row in x[:, len(self.bench.names) :]]
+        return np.array([np.concatenate([demands.grid, *parts]) for parts in own])
+
+    def seen(self, batch: Batch, names: tuple[str, ...] = ()) -> Motions:
+        """Return their columns, with derivatives by some parameters."""
+        code, demands, sets = (
+            code_of(self.bench.module),
+            self.bench.demands,
+            self.bench.sets(batch.x),
+        )
+        motion = batch.q, batch.q_dot, batch.q_ddot
+        outputs = observed(code, motion, batch.t, sets)
+
+        def column(name: str, order: int) -> Array:
+            if name in code.coordinates:
+                return motion[order][..., code.coordinates.index(name)]
+            return outputs.column(name, order).values
+
+        slope: Callable[[str, int], Array] | None = None
+        if names:
+            count, steps, n = batch.q.shape
+            states = (np.ascontiguousarray(part.reshape(-1, n).T) for part in motion)
+            lanes = np.ascontiguousarray(np.repeat(sets, steps, axis=0).T)
+            found = slopes_of(code, names, demands.columns, Points(lanes, batch.t.ravel(), *states))
+            by = found.reshape(3, len(names), -1, count, steps)
+            order_of = [x for x in (*code.coordinates, *code.outputs) if x in demands.columns]
+
+            def slope(name: str, order: int) -> Array:
+                return np.moveaxis(by[order, :, order_of.index(name)], 0, -1)
+
+        first, places = demands.grid.size, []
+        for target, _ in demands.passing:
+            own = np.arange(first, first + len(target.values))
+            places.append(np.broadcast_to(own, (len(batch.x), own.size)))
+            first += own.size
+        grid = np.arange(demands.grid.size)
+        return Motions(demands, batch.t, grid, places, column, slope, is_fine=False)
+
+    def assess(self, batch: Batch, names: tuple[str, ...] = ()) -> tuple[Array, Array]:
+        """Return deviations, with those of limits, (B, R), and derivatives (B, R, nx)."""
+        seen = self.seen(batch, names)
+        (rows, by), (gaps, gaps_by) = seen.rows(), seen.gaps()
+        off = np.concatenate((rows, EAGERNESS * np.minimum(gaps, 0.0)), axis=1)
+        if by is None or gaps_by is None:
+            return off, np.empty((*off.shape, 0))
+        beyond = EAGERNESS * gaps_by * (gaps < 0)[..., np.newaxis]
+        return off, np.concatenate((by, beyond), axis=1)
+
+    def costs(self, batch: Batch) -> Array:
+        """Return the error of each, with what limits are exceeded by; infinite where not found."""
+        found = np.full(len(batch.x), np.inf)
+        if batch.good.any():
+            off, _ = self.assess(batch.some(batch.good))
+            cost = (off**2).sum(axis=1)
+            found[batch.good] = np.where(np.isfinite(cost), cost, np.inf)
+        return found
+
+    def run(self, x: Array, q: Array, starts: int, is_over: Callable[[int], bool]) -> Designs:
+        """Follow motions (B, nx) that are near positions (B, N, n) to the ends of the best."""
+        batch = self.solved(x, q)
+        batch = batch.some(batch.good)
+        if not len(batch.x):
+            return Designs.none()
+        ends, walk = [], _Walk(self, self.projected(self._placed(batch)))
+        for step in range(ITERATIONS):
+            if step in KEPT and (most := max(FEWEST, int(KEPT[step] * starts))) < walk.cost.size:
+                rest = np.ones(walk.cost.size, dtype=bool)
+                rest[np.argsort(walk.cost, kind="stable")[:most]] = False
+                if KEPT[step] < 1:
+                    ends.append(walk.ends(rest))
+                walk.drop(rest)
+            if walk.is_done.any():
+                ends.append(walk.ends(walk.is_done))
+                walk.drop(walk.is_done)
+            if is_over(step) or not walk.cost.size:
+                break
+            walk.step()
+        ends.append(walk.ends(np.ones(walk.cost.size, dtype=bool)))
+        return Designs.best(ends)
+
+    def _placed(self, batch: Batch) -> Batch:
+        """Move, turn and scale mechanisms as a whole to where their points are wanted."""
+        pairs = self._point_pairs()
+        if not pairs or not len(batch.x):
+            return batch
+        names, some = self.bench.names, batch.some(slice(WITNESSES))
+        seen = self.seen(some, names)
+        z, slopes = _complex(seen, pairs[:1])
+        placing = Placing.of(z, slopes, some.x[:, : len(names)])
+        if placing is None:
+            return batch
+        linear = [names[k] for k in self.linear_of(some) if not placing.fields[:2, k].any()]
+        seen = self.seen(batch, tuple(linear) or names[:1])
+        parts = [
+            _complex(seen, [pair], places)
+            for pair, places in zip(pairs, seen.instants, strict=True)
+        ]
+        z, slopes = (np.concatenate([part[k] for part in parts], axis=1) for k in range(2))
+        passing = [target for target, _ in self.bench.demands.passing]
+        wanted = np.concatenate([item.values @ [1, 1j] for item in passing])
+        weights = np.concatenate([np.full(len(item.values), item.weights[0]) for item in passing])
+        known = np.isfinite(slopes).all(axis=(1, 2))
+        batch, z, slopes = batch.some(known), z[known], slopes[known][..., : len(linear)]
+        place, turn, along = best_places(z, slopes, wanted, weights)
+        x, k = batch.x.copy(), len(names)
+        x[:, [names.index(name) for name in linear]] += along
+        x[:, :k] = placing.moved(x[:, :k], place, turn)
+        return self._taken(
+            batch,
+            self.variables.around(x),
+            _turned(code_of(self.bench.module), batch.q, place, turn),
+        )
+
+    def _taken(self, batch: Batch, x: Array, q: Array) -> Batch:
+        """Return motions at other variables, where these lie within bounds and are no worse."""
+        inside = np.flatnonzero(self.variables.hold(x))
+        if inside.size:
+            found = self.solved(x[inside], q[inside], batch.signs[inside])
+            better = self.costs(found) < self.costs(batch.some(inside))
+            batch.put(inside[better], found.some(better))
+        return batch
+
+    def _point_pairs(self) -> list[tuple[str, str]]:
+        """Return the points whose two coordinates all targets are about; else nothing."""
+        demands, pairs = self.bench.demands, []
+        for _, columns in demands.passing:
+            names = [item.of for item in columns]
+            letters = [name.partition("_")[0] for name in names]
+            if letters != ["x", "y"] or any(item.order for item in columns):
+                return []
+            pairs.append((names[0], names[1]))
+        return [] if demands.shaped or demands.ratios else pairs
+
+    def linear_of(self, batch: Batch) -> tuple[int, ...]:
+        """Return the numbers of parameters on which deviations depend linearly, all together.
+
+        They are those whose derivatives none of them changes; limits must not depend on them.
+        """
+        if self._linear is None:
+            self._linear = tuple(self._found_linear(batch))
+        return self._linear
+
+    def _found_linear(self, batch: Batch) -> list[int]:
+        names, (low, high) = self.bench.names, (self.variables.low, self.variables.high)
+        seen = self.seen(batch, names)
+        before, (_, limits) = seen.rows()[1], seen.gaps()
+        assert before is not None
+        assert limits is not None
+        keeps = np.zeros((len(names), len(names)), dtype=bool)
+        for k in range(len(names)):
+            x = batch.x.copy()
+            step = PROBE * (high[k] - low[k])
+            x[:, k] += np.where(x[:, k] + step > high[k], -step, step)
+            found = self.solved(x, batch.q, batch.signs)
+            if not found.good.any():
+                continue
+            after = self.seen(found.some(found.good), names).rows()[1]
+            assert after is not None
+            own = before[found.good]
+            same = np.abs(after - own) <= LINEAR * np.nanmax(
+                np.abs(own), axis=(1, 2), keepdims=True
+            )
+            keeps[:, k] = same.all(axis=(0, 1))[: len(names)]
+        chosen: list[int] = []
+        for k in np.flatnonzero(keeps.diagonal()).tolist():
+            is_free = not np.nan_to_num(limits[..., k]).any() and before[..., k].any()
+            if is_free and keeps[k, chosen].all() and keeps[chosen, k].all():
+                chosen.append(k)
+        return chosen
+
+    def projected(self, batch: Batch) -> Batch:
+        """Put the linear parameters of what was found to their best values, within bounds."""
+        some = np.flatnonzero(batch.good)
+        linear = list(self.linear_of(batch.some(some[:WITNESSES]))) if some.size else []
+        if not linear:
+            return batch
+        own = batch.some(some)
+        off, by = self.seen(own, tuple(self.bench.names[k] for k in linear)).rows()
+        assert by is not None
+        known = np.isfinite(by).all(axis=(1, 2)) & np.isfinite(off).all(axis=1)
+        inverse = np.linalg.pinv(by[known][..., : len(linear)], rcond=SAME)
+        x = own.x.copy()
+        x[np.flatnonzero(known)[:, np.newaxis], linear] -= np.einsum(
+            "bij,bj->bi", inverse, off[known]
+        )
+        batch.put(some, self._taken(own, x, own.q))
+        return batch
+
+
+class _Walk:
+    """The steps of many starts."""
+
+    def __init__(self, descent: Descent, batch: Batch) -> None:
+        self.descent, self.batch = descent, batch
+        self.u = descent.variables.to_u(batch.x)
+        self.cost = descent.costs(batch)
+        count, nx = batch.x.shape
+        self.off, self.by = descent.assess(batch, descent.bench.names)
+        self.damping, self.growth = np.full(count, 1e-4), np.full(count, 2.0)
+        self.scale = np.zeros((count, nx))
+        self.is_done = ~np.isfinite(self.by).all(axis=(1, 2))
+        self.drop(self.is_done | ~np.isfinite(self.cost))
+
+    def drop(self, which: Any) -> None:
+        """Leave some out."""
+        keep = ~which
+        self.batch = self.batch.some(keep)
+        for name in ("u", "cost", "off", "by", "damping", "growth", "scale", "is_done"):
+            setattr(self, name, getattr(self, name)[keep])
+
+    def ends(self, which: Any) -> Designs:
+        """Return where some are."""
+        return Designs(self.cost[which], *(getattr(self.batch, x)[which] for x in ("x", "t", "q")))
+
+    def step(self) -> None:
+        """Take a step with each; one that is no better damps the next."""
+        descent, variables = self.descent, self.descent.variables
+        by = self.by * variables.slopes(self.batch.x)[:, np.newaxis]
+        slope = np.einsum("bri,br->bi", by, self.off)
+        square = np.einsum("bri,brj->bij", by, by)
+        self.scale = np.maximum(self.scale, np.einsum("bii->bi", square))
+        held = ((self.u <= 0) & (slope > 0)) | ((self.u >= 1) & (slope < 0))
+        held &= ~variables.is_turn
+        damped = self.damping[:, np.newaxis] * np.where(self.scale > 0, self.scale, 1.0)
+        one = np.eye(self.u.shape[1])
+        matrix = square + damped[..., np.newaxis] * one
+        is_out = held[:, :, np.newaxis] | held[:, np.newaxis, :]
+        matrix = np.where(is_out, held[..., np.newaxis] * one, matrix)
+        right = np.where(held, 0.0, -slope)[..., np.newaxis]
+        u = self.u + np.linalg.solve(matrix, right)[..., 0]
+        moved = np.where(variables.is_turn, u, np.clip(u, 0.0, 1.0)) - self.u
+        x = variables.to_x(variables.within(u))
+        trial = descent.projected(descent.solved(x, self.batch.q, self.batch.signs))
+        cost = descent.costs(trial)
+        foreseen = -(2 * slope * moved).sum(axis=1) - np.einsum(
+            "bi,bij,bj->b", moved, square, moved
+        )
+        with np.errstate(all="ignore"):
+            gain = np.where(foreseen > 0, (self.cost - cost) / foreseen, 0.0)
+        better = cost < self.cost
+        settled = better & (self.cost - cost <= SETTLED * self.cost)
+        self.is_done = settled | (self.damping > 1e12) | (self.cost < 1e-28)
+        eased = np.maximum(1 / 3, 1 - (2 * np.clip(gain, 0.0, 1.0) - 1) ** 3)
+        self.damping = self.damping * np.where(better, eased, self.growth)
+        self.growth = np.where(better, 2.0, 2 * self.growth)
+        own = np.flatnonzero(better)
+        if own.size:
+            self.batch.put(own, trial.some(own))
+            self.cost[own], self.u[own] = cost[own], variables.to_u(self.batch.x[own])
+            self.off[own], self.by[own] = descent.assess(self.batch.some(own), descent.bench.names)
+            lost = ~np.isfinite(self.by).all(axis=(1, 2))
+            self.by[lost] = 0.0
+            self.is_done |= lost
+
+
+def _complex(
+    seen: Motions, pairs: Sequence[tuple[str, str]], places: Any = None
+) -> tuple[Any, Any]:
+    """Return points as complex numbers (B, K) at places, and their derivatives."""
+    (x, y), slope = pairs[0], seen.slope
+    assert slope is not None
+    z, by = seen.column(x, 0) + 1j * seen.column(y, 0), slope(x, 0) + 1j * slope(y, 0)
+    if places is None:
+        return z, by
+    return np.take_along_axis(z, places, 1), np.take_along_axis(by, places[..., np.newaxis], 1)
+
+
+def _turned(code: Any, q: Array, place: Any, turn: Any) -> Array:
+    """Return positions (B, N, n) of which bodies of the plane are turned, scaled and moved."""
+    found, names = q.copy(), code.coordinates
+    for k, name in enumerate(names):
+        letter, _, body = name.partition("_")
+        if letter == "x" and f"y_{body}" in names:
+            other = names.index(f"y_{body}")
+            z = turn[:, np.newaxis] * (q[..., k] + 1j * q[..., other]) + place[:, np.newaxis]
+            found[..., k], found[..., other] = z.real, z.imag
+        elif letter == "phi":
+            found[..., k] += np.angle(turn)[:, np.newaxis]
+    return found
