@@ -150,6 +150,7 @@ pictures: $(DOCS_READY)
 course: $(DOCS_READY)
 	@rm -rf course
 	@$(BIN)/python -m docs.builders course course
+	@$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --wheel-dir course .
 	@echo "The course begins at course/index.html"
 
 # A peer that cannot be installed here is skipped, and the tables say so.

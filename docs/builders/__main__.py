@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 
-from docs.builders import course, fields, joints, notebooks, pictures
+from docs.builders import course, fields, joints, lessons, notebooks, pictures
 from docs.builders.places import DOCS, write
 
 WRITERS = {
     "pictures": lambda: write(
-        DOCS / "images", {**joints.pictures(), **course.sketches(), **pictures.drawn()}
+        DOCS / "images", {**joints.pictures(), **lessons.sketches(), **pictures.drawn()}
     ),
     "joints": lambda: write(DOCS, {"joints.md": joints.page()}),
     "fields": lambda: write(DOCS, {fields.PAGE: fields.page()}),

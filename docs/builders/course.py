@@ -1,33 +1,20 @@
-"""The course kit: each lesson of docs/course as slides, with its mechanism live, and exercises."""
+"""The course kit: each lesson of docs/course as a page, slides, a notebook, and exercises."""
 
 from __future__ import annotations
 
 import argparse
 import re
-import tempfile
 from base64 import b64encode
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
 
+from latex2mathml.converter import convert
 from markdown_it import MarkdownIt
 
 import kincompile as kc
-from docs.builders.places import DOCS, write
-from kincompile.report.document import Figure
-from kincompile.report.figure import standalone_svg
-
-if TYPE_CHECKING:
-    from kincompile.model.mechanism import Mechanism
-
-LESSONS = tuple(path.stem for path in sorted((DOCS / "course").glob("[0-9]_*.md")))
-
-MUSEUM = "museum"
-"""The lesson without a mechanism of its own: mistakes of real Jacobians."""
-
-MODEL = re.compile(r"^<!-- file: (\S+) -->\n```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
-LIVE = re.compile(r"^<!-- live: \w+ -->$", re.MULTILINE)
-"""Where a lesson shows its mechanism in motion."""
+from docs.builders import beamer, lessons, notebooks
+from docs.builders.lessons import Lesson
+from docs.builders.places import DOCS, ROOT, write
 
 PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -46,81 +33,79 @@ PAGE = """<!DOCTYPE html>
 """
 
 
-def text_of(lesson: str) -> str:
-    """Return the text of a lesson."""
-    return (DOCS / "course" / f"{lesson}.md").read_text(encoding="utf-8")
-
-
-def title(lesson: str) -> str:
-    """Return the heading of a lesson."""
-    return text_of(lesson).partition("\n")[0].removeprefix("# ")
-
-
-def model_file(lesson: str) -> tuple[str, str]:
-    """Return name and text of the model of a lesson."""
-    (found,) = MODEL.findall(text_of(lesson))
-    name, text = found
-    return name, text
-
-
-def model_of(lesson: str) -> Mechanism:
-    """Return the mechanism of a lesson."""
-    name, text = model_file(lesson)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, name)
-        path.write_text(text, encoding="utf-8")
-        model = kc.read_model(path)
-    return cast("Mechanism", model)
-
-
-def sketches() -> dict[str, str]:
-    """Return the sketch of each lesson, the mechanism with the axes of its bodies."""
-    found = {}
-    for lesson in LESSONS:
-        blocks = kc.derivation(model_of(lesson)).sections[0].blocks
-        (figure,) = (item for item in blocks if isinstance(item, Figure))
-        found[f"lesson_{lesson}.svg"] = standalone_svg(figure.picture)
-    return found
-
-
 def make(arguments: list[str]) -> None:
     """Write the kit into a folder, for a number of students."""
     parser = argparse.ArgumentParser(prog="python -m docs.builders course")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--students", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--lessons", nargs="*", default=[""], help="how their names begin")
+    parser.add_argument("--mistakes", action="store_true", help="slips for each student too")
     given = parser.parse_args(arguments)
-    for lesson in LESSONS:
-        _write_lesson(given.folder / lesson, lesson, given.students, given.seed)
-    folder, model = given.folder / MUSEUM, model_of(LESSONS[-1])
-    write(folder, {"slides.html": slides(MUSEUM)})
-    kc.exercise(model, given.students, given.seed, mistakes=True).write(folder / "exercise")
-    write(given.folder, {"index.html": _index()})
+    names = [name for name in lessons.NAMES if name.startswith(tuple(given.lessons))]
+    for name in names:
+        lesson, folder = Lesson(name), given.folder / name
+        write_lesson(folder, lesson)
+        kc.exercise(lesson.model, given.students, given.seed).write(folder / "exercise")
+        if given.mistakes:
+            kit = kc.exercise(lesson.model, given.students, given.seed, mistakes=True)
+            kit.write(folder / "mistakes")
+    for name in lessons.OTHERS:
+        write(given.folder / name, _shown(Lesson(name)))
+    write(given.folder, {"index.html": _index(names, given.mistakes)})
 
 
-def _write_lesson(folder: Path, lesson: str, students: int, seed: int) -> None:
-    name, text = model_file(lesson)
-    model = model_of(lesson)
-    write(folder, {name: text, "slides.html": slides(lesson)})
+def write_lesson(folder: Path, lesson: Lesson) -> None:
+    """Write what all students get of a lesson into a folder."""
+    file, text = lesson.model_file
+    model = lesson.model
+    write(folder, {file: text, "slides.tex": beamer.beamer(lesson), **_shown(lesson)})
     kc.page(model).write(folder / "live.html")
     derivation = kc.derivation(model)
     derivation.write(folder / "derivation.html")
     derivation.write(folder / "derivation.slides.html")
-    kc.exercise(model, students, seed).write(folder / "exercise")
 
 
-def slides(lesson: str) -> str:
+def _shown(lesson: Lesson) -> dict[str, str]:
+    """Return page, slides and notebook of a text."""
+    text = notebooks.of_lesson(lesson.text)
+    return {"page.html": page(lesson), "slides.html": slides(lesson), "notebook.ipynb": text}
+
+
+def page(lesson: Lesson) -> str:
+    """Return a lesson as a page to read."""
+    return _filled(lesson.title, f"<main>{_as_html(lesson.text)}</main>")
+
+
+def slides(lesson: Lesson) -> str:
     """Return a lesson as slides: one for each heading."""
-    text = LIVE.sub(
-        '<iframe src="live.html" title="The mechanism, live"></iframe>', text_of(lesson)
-    )
-    text = re.sub(r"^<!-- file: (\S+) -->$", r"`\1`", text, flags=re.MULTILINE)
+    parts = re.split(r"^(?=## )", lesson.text, flags=re.MULTILINE)
+    body = "\n".join(f"<section>{_as_html(part)}</section>" for part in parts)
+    return _filled(lesson.title, body + SCRIPT)
+
+
+def _as_html(text: str) -> str:
+    """Return Markdown of docs/course as a part of a page that stands alone."""
+    live = '<iframe src="live.html" title="The mechanism, live"></iframe>'
+    text = lessons.LIVE.sub(live, text)
+    text = lessons.MATH.sub(_formula, text)
+    text = re.sub(r"^<!-- (?:file|excerpt): (\S+) -->$", r"`\1`", text, flags=re.MULTILINE)
+    text = re.sub(r"^<!-- .*? -->\n", "", text, flags=re.MULTILINE)
     text = re.sub(r"!\[(.*?)\]\(\.\./(images/\S+)\)", _image, text)
-    printer = MarkdownIt("commonmark", {"html": True}).enable("table")
-    parts = re.split(r"^(?=## )", text, flags=re.MULTILINE)
-    body = "\n".join(f"<section>{printer.render(part)}</section>" for part in parts)
-    style = (DOCS / "static" / "slides.css").read_text(encoding="utf-8")
-    return PAGE.format(title=escape(title(lesson)), style=style, body=body + SCRIPT)
+    text = re.sub(r"\]\((\w+)\.md\)", r"](../\1/page.html)", text)
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\.md[^)]*\)", r"\1", text)  # the documentation stays behind
+    return str(MarkdownIt("commonmark", {"html": True}).enable("table").render(text))
+
+
+def _formula(match: re.Match[str]) -> str:
+    shown = convert(match[1].strip(), display="block").replace("\n", " ")
+    return f'<div class="math">{shown}</div>'
+
+
+def _filled(title: str, body: str) -> str:
+    style = (ROOT / "templates" / "report" / "math.css").read_text(encoding="utf-8")
+    style += (DOCS / "static" / "slides.css").read_text(encoding="utf-8")
+    return PAGE.format(title=escape(title), style=style, body=body)
 
 
 SCRIPT = """
@@ -142,24 +127,29 @@ def _image(match: re.Match[str]) -> str:
     return f'<img alt="{escape(match[1])}" src="data:image/svg+xml;base64,{data}">'
 
 
-def _index() -> str:
-    """Return the page that links what the kit has."""
-    style = (DOCS / "static" / "slides.css").read_text(encoding="utf-8")
-    body = "\n".join(_entry(lesson) for lesson in (*LESSONS, MUSEUM))
-    return PAGE.format(title="Course", style=style, body=f"<main><h1>Course</h1>{body}</main>")
+def _index(names: list[str], has_mistakes: bool) -> str:
+    """Return the page that links what the kit has: the syllabus, then every file."""
+    table = re.sub(r"\]\((\w+)\.md\)", r"](\1/page.html)", lessons.syllabus(names))
+    shown = MarkdownIt("commonmark").enable("table").render(f"# Course\n\n{table}")
+    body = "\n".join(_entry(name, has_mistakes) for name in (*names, *lessons.OTHERS))
+    return _filled("Course", f"<main>{shown}{body}</main>")
 
 
-def _entry(lesson: str) -> str:
-    links = {"slides.html": "slides"}
-    if lesson != MUSEUM:
+def _entry(name: str, has_mistakes: bool) -> str:
+    links = {"page.html": "page", "slides.html": "slides", "notebook.ipynb": "notebook"}
+    if name in lessons.NAMES:
         links |= {
+            "slides.tex": "beamer",
             "live.html": "live",
             "derivation.slides.html": "derivation as slides",
             "derivation.html": "derivation",
+            "exercise/students/01/exercise.html": "exercise of student 01",
+            "exercise/instructor/solutions.html": "solutions",
         }
-    links |= {
-        "exercise/students/01/exercise.html": "exercise of student 01",
-        "exercise/instructor/solutions.html": "solutions",
-    }
-    shown = " · ".join(f'<a href="{lesson}/{file}">{what}</a>' for file, what in links.items())
-    return f"<h2>{escape(title(lesson))}</h2><p>{shown}</p>"
+    if name in lessons.NAMES and has_mistakes:
+        links |= {
+            "mistakes/students/01/exercise.html": "find the mistake, student 01",
+            "mistakes/instructor/solutions.html": "its solutions",
+        }
+    shown = " · ".join(f'<a href="{name}/{file}">{what}</a>' for file, what in links.items())
+    return f"<h2>{escape(Lesson(name).title)}</h2><p>{shown}</p>"

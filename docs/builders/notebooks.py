@@ -11,6 +11,8 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import kincompile
+from docs.builders.lessons import MATH
 from docs.builders.places import DOCS, EXAMPLES
 
 if TYPE_CHECKING:
@@ -23,6 +25,14 @@ BLOCK = re.compile(
     r"(?:^<!-- file: (?P<file>\S+) -->\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```\n",
     re.MULTILINE | re.DOTALL,
 )
+
+INSTALL = f"""# In a browser (JupyterLite): the wheel that lies in the course folder
+import sys
+
+if sys.platform == "emscripten":
+    import micropip
+
+    await micropip.install("emfs:../kincompile-{kincompile.__version__}-py3-none-any.whl")"""
 
 METADATA = {
     "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
@@ -56,7 +66,19 @@ def notebooks() -> dict[str, str]:
 
 def cells(name: str) -> list[Cell]:
     """Return the cells of a tutorial."""
-    text = (DOCS / "tutorials" / f"{name}.md").read_text(encoding="utf-8")
+    return _cells((DOCS / "tutorials" / f"{name}.md").read_text(encoding="utf-8"))
+
+
+def of_lesson(text: str) -> str:
+    """Return a lesson as a notebook, which runs in a browser (JupyterLite) too."""
+    text = MATH.sub(r"$$\n\1$$", text)
+    text = re.sub(r"^<!-- (?!file: ).*? -->\n|^!\[.*\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r"\]\((\w+)\.md\)", r"](../\1/notebook.ipynb)", text)
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\.md[^)]*\)", r"\1", text)
+    return _as_json([Cell(INSTALL), *_cells(text)])
+
+
+def _cells(text: str) -> list[Cell]:
     found: list[Cell] = []
     end = 0
     for block in BLOCK.finditer(text):
@@ -75,7 +97,7 @@ def _cells_of(block: re.Match[str]) -> Iterator[Cell]:
     file, text = block["file"], block["text"].rstrip("\n")
     if file:
         yield Cell(f"%%writefile {file}\n{text}")
-        if file.endswith(".py"):
+        if re.search(r"kc\.(Mechanism|Sketch)\(", text):
             yield Cell(f'import kincompile as kc\n\nkc.read_model("{file}")')
     elif block["language"] == "python":
         yield Cell(text)

@@ -13,7 +13,7 @@ from posixpath import normpath
 from typing import TYPE_CHECKING
 
 import kincompile as kc
-from docs.builders import benchmark_plots, course, pictures
+from docs.builders import benchmark_plots, lessons, pictures
 from docs.builders.places import DOCS, EXAMPLES, ROOT, write
 from kincompile.model.catalogue import CONSTRAINTS
 from kincompile.space.catalogue import CONSTRAINTS as IN_SPACE
@@ -98,8 +98,10 @@ def _read(app: Sphinx, name: str, source: list[str]) -> None:
     if not name.startswith("made/"):
         folder = PurePosixPath("docs", name).parent
         source[0] = in_the_site(source[0], str(folder))
+    if name == "course/syllabus":
+        source[0] = source[0].replace(lessons.SYLLABUS, lessons.syllabus())
     if name.startswith("course/"):
-        source[0] = course.LIVE.sub(_live(f"lesson_{PurePosixPath(name).name}"), source[0])
+        source[0] = lessons.LIVE.sub(_live(f"lesson_{PurePosixPath(name).name}"), source[0])
     if name == "names":
         source[0] = _with_links(source[0]) + _toctree("made/api/*")
     if name == "guides":
@@ -202,8 +204,8 @@ def _write_motions() -> None:
         shown = pictures.still(last) if name.startswith("space/") else pictures.moving(name)
         write(GENERATED / "motions", {f"{last}.svg": shown})
         kc.page(kc.read_model(model)).write(live)
-    for lesson in course.LESSONS:
-        kc.page(course.model_of(lesson)).write(live_folder / f"lesson_{lesson}.html")
+    for name in lessons.NAMES:
+        kc.page(lessons.Lesson(name).model).write(live_folder / f"lesson_{name}.html")
 
 
 # ---- public names --------------------------------------------------------------------------------

@@ -28,6 +28,7 @@ import pytest
 from click.testing import CliRunner
 
 import kincompile as kc
+from docs.builders import lessons
 from kincompile.cli import cli
 from kincompile.names import listed
 
@@ -41,7 +42,9 @@ RUN = {
     "docs/tolerances.md": 4, "docs/space.md": 5, "docs/synthesis.md": 10,
     "docs/sweeps.md": 9, "docs/stepper.md": 3, "docs/in_c.md": 13, "docs/in_javascript.md": 13,
     "docs/in_rust.md": 6, "docs/in_octave.md": 9,
-    "docs/course/museum.md": 19, "docs/explanation/newton.md": 4, "docs/explanation/signs.md": 4,
+    "docs/course/museum.md": 19, "docs/course/project.md": 7,
+    "docs/explanation/newton.md": 4, "docs/explanation/signs.md": 4,
+    **{f"docs/course/{name}.md": 4 for name in lessons.NAMES},
 }  # fmt: skip
 """Pages that are run, and how many blocks each has at least."""
 
