@@ -689,12 +689,16 @@ static const struct {
     unsigned gives;
     void (*run)(strip *, size_t);
 } KERNEL[] = {
+#ifndef _ONLY_KINEMATICS
     {3, position_of_strip},
     {4, nu_of_strip},
     {8, gamma_of_strip},
+#endif
+#ifndef _WITHOUT_KINEMATICS
     {15, kinematics_of_strip},
+#endif
 };
-enum { KERNELS = 4, READS_RATES = 8 };
+enum { KERNELS = sizeof KERNEL / sizeof *KERNEL, READS_RATES = 8 };
 
 // Run the first kernel that gives all that is wanted, or as many as it takes.
 static void run_kernels(unsigned wanted, strip *b, size_t count)
@@ -821,6 +825,8 @@ int cam_by_table_evaluate(const cam_by_table_batch *batch)
     return total != 0;  // NaN too
 }
 
+#ifndef _ONLY_KINEMATICS
+
 void cam_by_table_solve(const cam_by_table_system *system)
 {
     strip b;
@@ -835,6 +841,8 @@ void cam_by_table_solve(const cam_by_table_system *system)
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
+
+#endif
 
 #endif
 
@@ -1960,7 +1968,7 @@ void cam_by_table_lead_variants(const cam_by_table_variants *m, cam_by_table_inp
 
 #endif
 
-#ifndef _WITHOUT_ONE
+#if !defined(_WITHOUT_ONE) && !defined(_ONLY_KINEMATICS)
 
 // One motion, as the solver has it.
 static cam_by_table_variants one_of(const cam_by_table_motion *motion)

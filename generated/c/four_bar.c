@@ -715,12 +715,16 @@ static const struct {
     unsigned gives;
     void (*run)(strip *, size_t);
 } KERNEL[] = {
+#ifndef _ONLY_KINEMATICS
     {3, position_of_strip},
     {4, nu_of_strip},
     {8, gamma_of_strip},
+#endif
+#ifndef _WITHOUT_KINEMATICS
     {15, kinematics_of_strip},
+#endif
 };
-enum { KERNELS = 4, READS_RATES = 8 };
+enum { KERNELS = sizeof KERNEL / sizeof *KERNEL, READS_RATES = 8 };
 
 // Run the first kernel that gives all that is wanted, or as many as it takes.
 static void run_kernels(unsigned wanted, strip *b, size_t count)
@@ -847,6 +851,8 @@ int four_bar_evaluate(const four_bar_batch *batch)
     return total != 0;  // NaN too
 }
 
+#ifndef _ONLY_KINEMATICS
+
 void four_bar_solve(const four_bar_system *system)
 {
     strip b;
@@ -861,6 +867,8 @@ void four_bar_solve(const four_bar_system *system)
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
+
+#endif
 
 #endif
 
@@ -1985,7 +1993,7 @@ void four_bar_lead_variants(const four_bar_variants *m, four_bar_input ends)
 
 #endif
 
-#ifndef _WITHOUT_ONE
+#if !defined(_WITHOUT_ONE) && !defined(_ONLY_KINEMATICS)
 
 // One motion, as the solver has it.
 static four_bar_variants one_of(const four_bar_motion *motion)

@@ -487,12 +487,16 @@ static const struct {
     unsigned gives;
     void (*run)(strip *, size_t);
 } KERNEL[] = {
+#ifndef _ONLY_KINEMATICS
     {3, position_of_strip},
     {4, nu_of_strip},
     {8, gamma_of_strip},
+#endif
+#ifndef _WITHOUT_KINEMATICS
     {15, kinematics_of_strip},
+#endif
 };
-enum { KERNELS = 4, READS_RATES = 8 };
+enum { KERNELS = sizeof KERNEL / sizeof *KERNEL, READS_RATES = 8 };
 
 // Run the first kernel that gives all that is wanted, or as many as it takes.
 static void run_kernels(unsigned wanted, strip *b, size_t count)
@@ -619,6 +623,8 @@ int problem_3_5_6_evaluate(const problem_3_5_6_batch *batch)
     return total != 0;  // NaN too
 }
 
+#ifndef _ONLY_KINEMATICS
+
 void problem_3_5_6_solve(const problem_3_5_6_system *system)
 {
     strip b;
@@ -633,6 +639,8 @@ void problem_3_5_6_solve(const problem_3_5_6_system *system)
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
+
+#endif
 
 #endif
 
@@ -1757,7 +1765,7 @@ void problem_3_5_6_lead_variants(const problem_3_5_6_variants *m, problem_3_5_6_
 
 #endif
 
-#ifndef _WITHOUT_ONE
+#if !defined(_WITHOUT_ONE) && !defined(_ONLY_KINEMATICS)
 
 // One motion, as the solver has it.
 static problem_3_5_6_variants one_of(const problem_3_5_6_motion *motion)

@@ -644,12 +644,16 @@ static const struct {
     unsigned gives;
     void (*run)(strip *, size_t);
 } KERNEL[] = {
+#ifndef _ONLY_KINEMATICS
     {3, position_of_strip},
     {4, nu_of_strip},
     {8, gamma_of_strip},
+#endif
+#ifndef _WITHOUT_KINEMATICS
     {15, kinematics_of_strip},
+#endif
 };
-enum { KERNELS = 4, READS_RATES = 8 };
+enum { KERNELS = sizeof KERNEL / sizeof *KERNEL, READS_RATES = 8 };
 
 // Run the first kernel that gives all that is wanted, or as many as it takes.
 static void run_kernels(unsigned wanted, strip *b, size_t count)
@@ -776,6 +780,8 @@ int slider_crank_evaluate(const slider_crank_batch *batch)
     return total != 0;  // NaN too
 }
 
+#ifndef _ONLY_KINEMATICS
+
 void slider_crank_solve(const slider_crank_system *system)
 {
     strip b;
@@ -790,6 +796,8 @@ void slider_crank_solve(const slider_crank_system *system)
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
+
+#endif
 
 #endif
 
@@ -1916,7 +1924,7 @@ void slider_crank_lead_variants(const slider_crank_variants *m, slider_crank_inp
 
 #endif
 
-#ifndef _WITHOUT_ONE
+#if !defined(_WITHOUT_ONE) && !defined(_ONLY_KINEMATICS)
 
 // One motion, as the solver has it.
 static slider_crank_variants one_of(const slider_crank_motion *motion)

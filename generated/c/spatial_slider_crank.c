@@ -2052,14 +2052,18 @@ static const struct {
     unsigned gives;
     void (*run)(strip *, size_t);
 } KERNEL[] = {
+#ifndef _ONLY_KINEMATICS
     {3, position_of_strip},
     {4, nu_of_strip},
     {8, gamma_of_strip},
     {128, outputs_q_of_strip},
-    {15, kinematics_of_strip},
     {112, observe_of_strip},
+#endif
+#ifndef _WITHOUT_KINEMATICS
+    {15, kinematics_of_strip},
+#endif
 };
-enum { KERNELS = 6, READS_RATES = 248, READS_SECOND_RATES = 240 };
+enum { KERNELS = sizeof KERNEL / sizeof *KERNEL, READS_RATES = 248, READS_SECOND_RATES = 240 };
 
 // Run the first kernel that gives all that is wanted, or as many as it takes.
 static void run_kernels(unsigned wanted, strip *b, size_t count)
@@ -2203,6 +2207,8 @@ int spatial_slider_crank_evaluate(const spatial_slider_crank_batch *batch)
     return total != 0;  // NaN too
 }
 
+#ifndef _ONLY_KINEMATICS
+
 void spatial_slider_crank_solve(const spatial_slider_crank_system *system)
 {
     strip b;
@@ -2217,6 +2223,8 @@ void spatial_slider_crank_solve(const spatial_slider_crank_system *system)
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
+
+#endif
 
 #endif
 
@@ -3350,7 +3358,7 @@ void spatial_slider_crank_lead_variants(const spatial_slider_crank_variants *m,
 
 #endif
 
-#ifndef _WITHOUT_ONE
+#if !defined(_WITHOUT_ONE) && !defined(_ONLY_KINEMATICS)
 
 // One motion, as the solver has it.
 static spatial_slider_crank_variants one_of(const spatial_slider_crank_motion *motion)

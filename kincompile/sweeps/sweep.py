@@ -11,6 +11,7 @@ chunks     -> executor    those that are missing, a few at a time             ch
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from kincompile.sweeps.layout import bearing_of, read_layout
 from kincompile.sweeps.plan import Plan, chunk_size
 from kincompile.sweeps.result import Sweep
 from kincompile.sweeps.store import open_store
-from kincompile.sweeps.worker import Job
+from kincompile.sweeps.worker import Job, run
 
 if TYPE_CHECKING:
     import os
@@ -212,6 +213,10 @@ def _solve_missing(
     if progress and done:
         progress(done, plan.grid.variants)
     missing = np.flatnonzero(~is_done).tolist()
+    if executor is not None and missing:
+        # C compiles here what sets need: of workers, each that finds no library would build it.
+        begin = replace(job, t=job.t[:1], layout=replace(job.layout, kept=()))
+        run(begin, missing[0], plan.sets(missing[0])[:1])
     job = job.written_by(kept.writer())
     for number, values in solved(job, plan, missing, executor, pending):
         if values is not None:

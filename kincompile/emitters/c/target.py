@@ -172,7 +172,10 @@ def _batch(code: InlineProgram) -> dict[str, Any]:
         ]
         matrices += height * width
     bits = {item.name: 1 << k for k, item in enumerate(program.quantities)}
-    kernels = quantities.kernels(program.quantities)
+    kernels = {
+        name: f"{{{sum(bits[item] for item in given)}, {name}_of_strip}},"
+        for name, given in quantities.kernels(program.quantities).items()
+    }
     return {
         "quantities": indented(rows),
         "n_quantities": len(bits),
@@ -186,11 +189,8 @@ def _batch(code: InlineProgram) -> dict[str, Any]:
             )
         ),
         "matrices": max(matrices, 1),
-        "kernels": indented(
-            f"{{{sum(bits[item] for item in given)}, {name}_of_strip}},"
-            for name, given in kernels.items()
-        ),
-        "n_kernels": len(kernels),
+        "kinematics": indented([kernels.pop("kinematics")]),
+        "kernels": indented(kernels.values()),
         **{
             f"reads_{state}": sum(
                 bits[item.name] for item in program.quantities if state in item.reads

@@ -27,7 +27,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from threading import Timer
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from kincompile.errors import InputError, KincompileWarning, UnsupportedError
 from kincompile.names import escaped
@@ -47,13 +47,30 @@ FLAGS = (
 OWN = ("-D_WITHOUT_START",)
 """Flags of the runtime's libraries: it has a start of its own."""
 
-ONE, SETS = ("-D_WITHOUT_SETS",), ("-D_WITHOUT_ONE",)
-"""Flags of the two libraries of one source: what one motion and given points need, which is built
-at once, and what many parameter sets need, which is built on request."""
+QUICK = ("-O2", "-D_WHOLE_REGISTERS", "-ftree-vectorize", "-fvect-cost-model", "-funswitch-loops")
+"""Loops over points take several at once, as with -O3, for which gcc takes up to twice as long.
+Motions are solved as fast, and of batches only entries of matrices take longer, by a sixth."""
 
-VECTORIZED = ("-O3", "-D_WHOLE_REGISTERS", "-fno-ipa-cp-clone", "-fno-inline-functions")
+FULL = ("-O3", "-D_WHOLE_REGISTERS", "-fno-ipa-cp-clone", "-fno-inline-functions")
 """In full, but for copies of functions that the code does not ask for: a loop over points is then
 compiled once. Without the last three gcc takes three times as long for the same speed."""
+
+
+class Part(NamedTuple):
+    """A library of a source: the flags that optimize it, and those that leave the rest out."""
+
+    level: tuple[str, ...]
+    only: tuple[str, ...]
+
+
+ONE = Part(QUICK, ("-D_WITHOUT_SETS", "-D_WITHOUT_KINEMATICS"))
+"""What one motion and the quantities of given points need: it is built at once."""
+
+KINEMATICS = Part(FULL, ("-D_WITHOUT_SETS", "-D_ONLY_KINEMATICS"))
+"""All quantities of given points in one go, which no motion needs: built on request."""
+
+SETS = Part(FULL, ("-D_WITHOUT_ONE",))
+"""What many parameter sets need: built on request."""
 
 LARGEST_VECTORIZED = 302_000
 """Characters of source up to which it is optimized in full, an angle's cosine and sine, which are
@@ -80,16 +97,21 @@ ALTERNATIVE = "or use the NumPy target, which needs no compiler: kc.compile(m)"
 REPAIR = f"repair or reinstall it, name another by the environment variable CC, {ALTERNATIVE}"
 
 
-def library(
-    name: str, files: Mapping[str, str], fingerprint: str, part: tuple[str, ...] = ONE
-) -> ctypes.CDLL:
-    """Return a library of emitted C code, ONE or SETS, from the cache or newly built.
+def library(name: str, files: Mapping[str, str], fingerprint: str, part: Part = ONE) -> ctypes.CDLL:
+    """Return a library of emitted C code, a part of it, from the cache or newly built.
 
     Of the files, text by name, the source comes first; the fingerprint is what the library must say
     of itself. An `UnsupportedError` says what is wrong with the compiler.
     """
     source = next(iter(files.values()))
-    command = (*_compiler(), *_level(source), *FLAGS, *OWN, *part, *_machine_flags())
+    command = (
+        *_compiler(),
+        *_level(source, part.level),
+        *FLAGS,
+        *OWN,
+        *part.only,
+        *_machine_flags(),
+    )
     digest = hashlib.sha256()
     for text in (*command, _version(command[0]), _processor(), *files, *files.values()):
         digest.update(text.encode() + b"\0")
@@ -130,7 +152,7 @@ def shared_library(files: Mapping[str, str]) -> bytes | None:
         )
         return None
     # Points come one by one: loops over many of them, which -O3 is for, gain nothing.
-    level = min(_level(max(files.values(), key=len)), ("-O1",))
+    level = _level(max(files.values(), key=len), ("-O1",))
     command = (*compiler, *level, *FLAGS, "-fvisibility=hidden")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as temporary:
         built = _built(command, Path(temporary), files)
@@ -138,12 +160,12 @@ def shared_library(files: Mapping[str, str]) -> bytes | None:
         return built.read_bytes()
 
 
-def _level(source: str) -> tuple[str, ...]:
+def _level(source: str, wanted: tuple[str, ...]) -> tuple[str, ...]:
     """Return the flags that say how far code is optimized: as far as it does not take a minute."""
     if max(map(len, source.split("\n}\n"))) > LONGEST_OPTIMIZED:
         return ("-O0",)
     is_large = len(source) + ANGLE * source.count("cos_sin(") > LARGEST_VECTORIZED
-    return ("-O1",) if is_large else VECTORIZED
+    return ("-O1",) if is_large else wanted
 
 
 def _compiler() -> tuple[str, ...]:

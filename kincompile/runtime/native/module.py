@@ -20,7 +20,7 @@ from kincompile.criteria import FAR
 from kincompile.errors import InputError
 from kincompile.runtime.engine.code import ORIGIN, attach, code_of
 from kincompile.runtime.memory import empty
-from kincompile.runtime.native.library import SETS, library
+from kincompile.runtime.native.library import KINEMATICS, ONE, SETS, library
 from kincompile.runtime.native.points import (
     NUMBER,
     REAL,
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from kincompile.quantities import Quantity
     from kincompile.runtime.engine.code import Compiled
     from kincompile.runtime.inputs import Inputs
+    from kincompile.runtime.native.library import Part
 
     Array = NDArray[np.float64]
     Function = Callable[..., Any]
@@ -63,14 +64,13 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
     """Replace the functions of an emitted NumPy module by compiled ones, from what C emitted.
 
     Where the mechanism has a planned solve the module gets one more, ``compiled_march``. An
-    `UnsupportedError` says what is wrong with the compiler. What many parameter sets need is
-    built when it is first called.
+    `UnsupportedError` says what is wrong with the compiler. What many parameter sets need, and
+    all quantities of points in one go, are built when they are first called.
     """
     code, names = code_of(module), vars(module)
     present = code.quantities
-    build = partial(library, code.name, files, names["FINGERPRINT"])
-    loaded = build()
-    functions = _Functions(code, names["_batch"], loaded, cache(partial(build, SETS)))
+    parts = cache(partial(library, code.name, files, names["FINGERPRINT"]))
+    functions = _Functions(code, names["_batch"], parts)
     given = {**quantities.functions(present), **_nonzeros(present)}
     compiled = {name: functions.evaluator(name, results) for name, results in given.items()}
     compiled["kinematics_batch_last"] = functions.batch_last()
@@ -80,7 +80,7 @@ def make_native(module: ModuleType, files: Mapping[str, str]) -> ModuleType:
         compiled["compiled_attempts"] = functions.attempts()
         compiled["compiled_mirror"] = functions.mirror()
         compiled["compiled_lead"] = functions.lead()
-        compiled["compiled_stepper"] = stepper_of(code, loaded)
+        compiled["compiled_stepper"] = stepper_of(code, parts(ONE))
         lanes = names["LANES"]
         names["LANES"] = {**lanes, "position": functions.position_of_lanes(lanes["position"])}
     if "observe" in names:
@@ -107,26 +107,31 @@ def _nonzeros(present: Sequence[Quantity]) -> dict[str, tuple[str, ...]]:
     return {f"{item.name}_nonzeros": (quantities.nonzeros_of(item),) for item in matrices}
 
 
+def _part_of(results: Sequence[str]) -> Part:
+    """Return which library gives results."""
+    return KINEMATICS if tuple(results) == quantities.TOGETHER["kinematics"] else ONE
+
+
 class _Functions:
     """Makes the functions of a module from those of its library."""
 
     def __init__(
-        self,
-        code: Compiled,
-        checked: Function,
-        loaded: ctypes.CDLL,
-        of_sets: Callable[[], ctypes.CDLL],
+        self, code: Compiled, checked: Function, parts: Callable[[Part], ctypes.CDLL]
     ) -> None:
         self._code, self._checked_batch = code, checked
-        self._library, self._of_sets, self._name = loaded, of_sets, code.name
+        self._library, self._parts, self._name = parts(ONE), parts, code.name
         self._n, self._m = len(code.coordinates), len(code.equations)
         self._shapes = _shapes(code)
         self._batch_type = batch_type(tuple(self._shapes))
-        self._run = getattr(loaded, f"{self._name}_evaluate")
+        self._evaluate: Function = cache(lambda part: getattr(parts(part), f"{code.name}_evaluate"))
+
+    def _run(self, batch: Any, part: Part = ONE) -> Any:
+        """Evaluate a batch; not 0 where a number is not finite."""
+        return self._evaluate(part)(byref(batch))
 
     def _sets(self, name: str, *arguments: Any, result: Any = None) -> Function:
         """Return a function of many parameter sets, whose library is built if need be."""
-        run: Any = getattr(self._of_sets(), f"{self._name}_{name}_variants")
+        run: Any = getattr(self._parts(SETS), f"{self._name}_{name}_variants")
         run.argtypes, run.restype = (c_void_p, *arguments), result
         found: Function = run
         return found
@@ -136,7 +141,8 @@ class _Functions:
         original, states = self._code.functions[name], _states(name)
         if len(states) == len(STATES):
             return self._of_second_rates(results, original)
-        places = Places(self._code, self._library, results, self._shapes, self._batch_type)
+        loaded = partial(self._parts, _part_of(results))
+        places = Places(self._code, loaded, results, self._shapes, self._batch_type)
         make = function_of_positions if len(states) == 1 else function_of_states
         return make(places, self._batch, original)
 
@@ -194,7 +200,7 @@ class _Functions:
             size = math.prod(self._shapes[quantity])
             setattr(batch, quantity, Numbers(result.ctypes.data, 1, size))
             results.append(result)
-        if self._run(byref(batch)):
+        if self._run(batch, _part_of(wanted)):
             return None
         return results[0] if len(results) == 1 else tuple(results)
 
@@ -228,7 +234,8 @@ class _Functions:
             batch.varying_only = out is not None
             for quantity, result in zip(BATCH_LAST, results, strict=True):
                 setattr(batch, quantity, numbers_of_batch(result))
-            return original(q, q_dot, t, p) if self._run(byref(batch)) else results
+            failed = self._run(batch, KINEMATICS)
+            return original(q, q_dot, t, p) if failed else results
 
         kinematics_batch_last.__doc__ = f"""{original.__doc__}
     out, if given, is what an earlier call for as many points returned: the arrays are filled again,
@@ -257,7 +264,7 @@ class _Functions:
             batch = self._batch_type(shape[1], numbers_of_batch(q))
             batch.t, batch.p = numbers_of_times(time), numbers_of_batch(p)
             batch.Phi, batch.nonzeros = map(numbers_of_batch, (values[:m], values[m:]))
-            self._run(byref(batch))
+            self._run(batch)
             return [values[row] for row in rows]
 
         return position
@@ -314,7 +321,7 @@ class _Functions:
                 setattr(batch, name, numbers_of_batch(state))
             for name, part in zip(quantities.TOGETHER["observe"], found, strict=False):
                 setattr(batch, name, numbers_of_batch(part))
-            self._run(byref(batch))
+            self._run(batch)
 
         return observe_into
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import Structure, addressof, byref, c_double, c_int, c_size_t, c_ssize_t, c_void_p
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -117,7 +117,7 @@ class Places:
     def __init__(
         self,
         code: Compiled,
-        loaded: ctypes.CDLL,
+        loaded: Callable[[], ctypes.CDLL],
         quantities: Sequence[str],
         shapes: Mapping[str, tuple[int, ...]],
         batch_type: type[Any],
@@ -126,20 +126,20 @@ class Places:
         self.quantities, self.copied = quantities, COPIED[len(quantities)]
         self._batch_type = batch_type
         self._shapes = [shapes[quantity] for quantity in quantities]
-        # To give up the interpreter's lock for a point would take longer than the point.
-        prototype = ctypes.PYFUNCTYPE(c_int, c_void_p)
-        self.run: Function = prototype((f"{code.name}_evaluate", loaded))
-        self.free = [self.new()]
+        self._name, self._library = f"{code.name}_evaluate", loaded
+        self.free: list[Any] = []
 
-    def new(self) -> tuple[Array, Array, c_double, Array, list[Array], Any, Any]:
-        """Return the arrays of q, q_dot, t, p, the results, and the arguments of the C call.
+    def new(self) -> tuple[Array, Array, c_double, Array, list[Array], Function, Function]:
+        """Return the arrays of q, q_dot, t, p, the results, and the two calls of C.
 
-        That is: to take the default parameters, or those that are written.
+        That is: with the default parameters, or those that are written.
         """
+        # To give up the interpreter's lock for a point would take longer than the point.
+        run = ctypes.PYFUNCTYPE(c_int, c_void_p)((self._name, self._library()))
         q, q_dot = np.zeros((2, *self.shape))
         time, parameters = c_double(), self.defaults.copy()
         results = [np.zeros(shape) for shape in self._shapes]
-        batches = []
+        calls = []
         for p in (self.defaults, parameters):
             batch = self._batch_type(
                 1,
@@ -150,17 +150,17 @@ class Places:
             )
             for quantity, result in zip(self.quantities, results, strict=True):
                 setattr(batch, quantity, numbers_of_point(result))
-            self.run(byref(batch))
+            run(byref(batch))
             batch.varying_only = 1  # from now on the constants are in place
-            batches.append(byref(batch))
-        return q, q_dot, time, parameters, results, batches[0], batches[1]
+            calls.append(partial(run, byref(batch)))
+        return q, q_dot, time, parameters, results, calls[0], calls[1]
 
 
 def function_of_states(places: Places, evaluate: Function, original: Function) -> Function:
     """Return a function of q, q_dot, t and p."""
     defaults, quantities, copied = places.defaults, places.quantities, places.copied
     ndarray, shape, p_shape, real = np.ndarray, places.shape, defaults.shape, REAL
-    run, new, take, put_back = places.run, places.new, places.free.pop, places.free.append
+    new, take, put_back = places.new, places.free.pop, places.free.append
 
     def of_states(q: Any, q_dot: Any, t: Any, p: Any = defaults) -> Any:
         if (
@@ -172,17 +172,17 @@ def function_of_states(places: Places, evaluate: Function, original: Function) -
         ):  # fmt: skip
             try:
                 place = take()
-            except IndexError:  # all are taken by other threads
+            except IndexError:  # the first call, or other threads have all
                 place = new()
             q_place, q_dot_place, time, parameters, results, own, given = place
             q_place[...] = q
             q_dot_place[...] = q_dot
             time.value = t
             if p is defaults:
-                failed = run(own)
+                failed = own()
             else:
                 parameters[...] = p
-                failed = run(given)
+                failed = given()
             found = copied(*results)
             put_back(place)
             if not failed:
@@ -197,7 +197,7 @@ def function_of_positions(places: Places, evaluate: Function, original: Function
     """Return a function of q, t and p; the same without rates, of which C then reads none."""
     defaults, quantities, copied = places.defaults, places.quantities, places.copied
     ndarray, shape, p_shape, real = np.ndarray, places.shape, defaults.shape, REAL
-    run, new, take, put_back = places.run, places.new, places.free.pop, places.free.append
+    new, take, put_back = places.new, places.free.pop, places.free.append
 
     def of_positions(q: Any, t: Any, p: Any = defaults) -> Any:
         if (
@@ -214,10 +214,10 @@ def function_of_positions(places: Places, evaluate: Function, original: Function
             q_place[...] = q
             time.value = t
             if p is defaults:
-                failed = run(own)
+                failed = own()
             else:
                 parameters[...] = p
-                failed = run(given)
+                failed = given()
             found = copied(*results)
             put_back(place)
             if not failed:

@@ -1,5 +1,6 @@
 """The compiled module keeps the contract of the NumPy module, number by number and word by word."""
 
+import ctypes
 import threading
 from itertools import pairwise
 
@@ -407,3 +408,33 @@ def test_batches_that_are_written_past_the_caches_agree(four_bar, points):
     found = native.kinematics_batch_last(*last)
     assert_same(found, expected)
     assert_same(native.kinematics_batch_last(*last, out=found), expected)
+
+
+def test_that_all_quantities_in_one_go_are_compiled_on_request(
+    monkeypatch, tmp_path, quick_compiler, example_named
+):
+    """Motions, steps and single quantities need one library; `kinematics` has another."""
+    monkeypatch.setenv("CC", quick_compiler)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    module = example_named("four_bar").module
+    native = kc.compile(example_named("four_bar").model, target="c")
+    q, q_dot, t = states(module, 40)
+    for at in (3, slice(None)):
+        state = q[at], q_dot[at], t[at] if at != 3 else float(t[at])
+        for name in OF_POSITION:
+            assert_same(
+                getattr(native, name)(state[0], state[2]), getattr(module, name)(state[0], state[2])
+            )
+        for name in ("gamma", "acceleration"):
+            assert_same(getattr(native, name)(*state), getattr(module, name)(*state))
+    assert kc.solve(native, np.linspace(0, 1, 5)).success
+    kc.stepper(native)(0.1)
+    first = set(tmp_path.rglob("*.so"))
+    assert len(first) == 1
+    assert_same(native.kinematics(q, q_dot, t), module.kinematics(q, q_dot, t))
+    (second,) = set(tmp_path.rglob("*.so")) - first
+    rows = q.T.copy(), q_dot.T.copy(), t
+    assert_same(native.kinematics_batch_last(*rows), module.kinematics_batch_last(*rows))
+    assert_same(native.kinematics(q[0], q_dot[0], 0.5), module.kinematics(q[0], q_dot[0], 0.5))
+    absent = ("solve", "march", "go_on", "follow_variants")
+    assert not any(hasattr(ctypes.CDLL(str(second)), f"four_bar_{name}") for name in absent)

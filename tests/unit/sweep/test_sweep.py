@@ -138,6 +138,22 @@ def test_c_gives_the_numbers_too(quick_compiler):
     np.testing.assert_allclose(found["tip.x"], expected, atol=1e-13)
 
 
+def test_that_workers_find_what_c_compiles_for_sets(monkeypatch, tmp_path, quick_compiler):
+    """The libraries of one motion and of many sets are built before a chunk is sent."""
+    monkeypatch.setenv("CC", quick_compiler)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    libraries = []
+
+    class Watched(ThreadPoolExecutor):
+        def submit(self, *args):
+            libraries.append(len(list(tmp_path.rglob("*.so"))))
+            return super().submit(*args)
+
+    with Watched(2) as executor:
+        sweep(columns=["tip.x"], target="c", chunk=5, executor=executor)
+    assert set(libraries) == {2}
+
+
 @pytest.mark.parametrize("ending", ["zarr", "parquet"])
 @pytest.mark.parametrize("product", [True, False])
 def test_a_folder_has_the_results_and_their_units(ending, product, tmp_path):
