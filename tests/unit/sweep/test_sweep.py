@@ -144,12 +144,14 @@ def test_that_workers_find_what_c_compiles_for_sets(monkeypatch, tmp_path, quick
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     libraries = []
 
-    class Watched(ThreadPoolExecutor):
-        def submit(self, *args):
-            libraries.append(len(list(tmp_path.rglob("*.so"))))
-            return super().submit(*args)
+    with ThreadPoolExecutor(2) as executor:
+        submit = executor.submit
 
-    with Watched(2) as executor:
+        def watched(*args):
+            libraries.append(len(list(tmp_path.rglob("*.so"))))
+            return submit(*args)
+
+        monkeypatch.setattr(executor, "submit", watched)
         sweep(columns=["tip.x"], target="c", chunk=5, executor=executor)
     assert set(libraries) == {2}
 
