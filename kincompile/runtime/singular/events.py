@@ -217,8 +217,8 @@ def branch_switch(code: Compiled, state: State, t: float, q: Vector, reference: 
 def _event(equations: Problem, kind: str, q: Vector, t: float, Phi_q: Vector) -> Event:
     """Name what moves, and say what to do."""
     _, sizes, directions = np.linalg.svd(equations.scaled(Phi_q))
-    # Equal loops become singular together: then several movements are free.
-    free = directions[np.append(sizes[:-1] <= IN_RANGE * sizes[0], True)]
+    # Equal loops become singular together: then several movements are free, in the end all.
+    free = directions[np.append(sizes[:-1] <= IN_RANGE * max(sizes[0], 1.0), True)]
     return event_of(equations.code, kind, SENTENCES, t, q, free)
 
 

@@ -393,6 +393,7 @@ def test_two_blocks_that_turn_singular_together_are_noticed():
         assert not found.success
         np.testing.assert_array_equal(found.status, expected.status)
         assert found.message == expected.message
+        assert "x, y may continue in two ways" in found.message
 
 
 # ---------------------------------------------------------------- large batches
