@@ -169,7 +169,7 @@ def test_arguments_beside_the_name_reach_the_compiler(monkeypatch, compiler, cac
     monkeypatch.setenv("CC", f"{os.environ['CC']} -DEXTRA=1")
     assert_right(kc.compile(tiny(), target="c"))
     seen = (tmp_path / "seen").read_text()
-    assert seen.startswith("-DEXTRA=1 -O3 -D_WHOLE_REGISTERS ")
+    assert seen.startswith("-DEXTRA=1 -O2 -D_WHOLE_REGISTERS ")
     assert " -std=c99 " in seen
 
 
