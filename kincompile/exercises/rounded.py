@@ -148,6 +148,8 @@ def _fitted(
     def at(values: Array) -> Array:
         numbers = dict(zip(unknowns, map(sympy.Float, values.tolist()), strict=True))
         formulas = [item.xreplace(numbers) for item in (right, expression, *slopes)]
+        if any(item.has(sympy.zoo, sympy.nan) for item in formulas):  # a divisor became 0
+            return np.full((len(states), len(formulas)), np.nan)
         found, _ = reference.evaluate(formulas, states)
         return found
 

@@ -163,6 +163,13 @@ def test_that_digits_hide_no_slip(tmp_path: Path) -> None:
     assert "B2: right to 2 digits: 1.001 stands for 1 and 2.87 stands for 2.86875" in row["reasons"]
 
 
+def test_that_a_divisor_that_is_fitted_to_zero_stops_no_marking(tmp_path: Path) -> None:
+    """The entry is half of the right one: a step of Newton's method takes its 4 to 0."""
+    folder = kc.exercise(MODEL, 1, 1).write(tmp_path / "kit")
+    row = marked(hand_in(folder, "-5.7375 sin(phi_arm)/4", "2.86875 cos(phi_arm)"))
+    assert [row[f"B{k}"] for k in (1, 2)] == ["0", "1"]
+
+
 def test_that_digits_are_few_and_no_tolerance() -> None:
     for digits in (0, 7, 2.5, True):
         with pytest.raises(kc.InputError, match="give a number from 1 to 6"):
