@@ -188,7 +188,8 @@ class MotionTable:
             return self._column(*column_meant(self.name, name, self.coordinates, outputs))
         except InputError:
             # Points of joints are compiled on request, so they come last.
-            found = rate_of(name, self.joints.names) if "." in str(name) else None
+            is_asked = str(name).startswith(("x_", "y_", "z_")) or "." in str(name)
+            found = rate_of(name, self.joints.names) if is_asked else None
             if found is None:
                 raise
         return self.joints.column(*found)

@@ -8,25 +8,27 @@ definition of a deviation, for results and for the targets of `kc.fit`.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import SAME, STILL
+from kincompile.criteria import ROOT_LENGTH, SAME, STILL
 from kincompile.errors import InputError
-from kincompile.names import shown
+from kincompile.names import column_name, shown
 from kincompile.runtime.engine.code import DRIVERS
 from kincompile.runtime.results.columns import shown_unit
+from kincompile.runtime.singular.curve import zero
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.results.columns import MotionTable
 
 PARTS = 8
-"""Parts of a step at which a path is looked at."""
+"""Parts of a step at which a path is looked at; its farthest places are found between them."""
 
 ROUNDS = 50
 """Steps of Gauss and Newton towards the nearest circle."""
@@ -215,18 +217,66 @@ def path_deviation(
     if any(name.startswith("e0_") for name in solution.coordinates):
         raise InputError(f"{solution.name} moves in space: paths are compared in the plane only.")
     times, inside = _part(solution, between)
-    names = [f"{point}.{axis}" for axis in "xy"]
-    values = np.column_stack([_curve(solution, name)(times) for name in names])[inside]
+    names = _of_point(solution, point)
+    curves = [_curve(solution, name) for name in names]
+    values = np.column_stack([curve(times) for curve in curves])[inside]
     times = times[inside]
     found = (nearest_line if shape == "line" else nearest_circle)(values, given)
-    sizes, unit = np.abs(found.offsets), solution.column(names[0]).unit
-    worst = int(np.argmax(sizes))
+    t, farthest = _farthest(curves, times, found)
     direction = None if found.direction is None else (*found.direction.tolist(),)
     return PathDeviation(
-        point, unit, shape, float(sizes[worst]), float(times[worst]),
+        point, solution.column(names[0]).unit, shape, farthest, t,
         float(np.sqrt(np.mean(found.offsets**2))), (*found.place.tolist(),), direction,
         found.radius, float(times[0]), float(times[-1]),
     )  # fmt: skip
+
+
+def _of_point(solution: MotionTable, point: str) -> tuple[str, str]:
+    """Return the names of both coordinates of a point; of a column say which point it is of."""
+    names = f"{point}.x", f"{point}.y"
+    try:
+        solution.column(names[0])
+    except InputError:
+        quantity, _, owner = column_name(point).partition("_")
+        if quantity not in ("x", "y") or not owner:
+            raise
+        solution.column(f"{owner}.x")
+        raise InputError(
+            f"{point!r} is a column, and a path is that of a point. Name the point: {owner!r}."
+        ) from None
+    return names
+
+
+def _farthest(curves: Sequence[Any], times: Array, found: Nearest) -> tuple[float, float]:
+    """Return when a path is farthest from a line or circle, and how far, between times too."""
+    rates, seconds = ([curve.derivative(k) for curve in curves] for k in (1, 2))
+
+    def at(t: Any) -> Array:
+        """Return distances from the shape, their rates and second rates, (3, N)."""
+        place, rate, second = (
+            np.array([curve(np.atleast_1d(t)) for curve in of]).T for of in (curves, rates, seconds)
+        )
+        if found.radius is None:
+            offsets, away, bend = (place - found.place) @ found.slopes[0], found.slopes[:1], 0.0
+        else:
+            offsets, away = _from_circle(place, np.array([*found.place, found.radius]))
+            across = (rate**2).sum(axis=1) - (away * rate).sum(axis=1) ** 2
+            bend = across / np.maximum(offsets + found.radius, STILL * found.radius)
+        return np.array((offsets, (away * rate).sum(axis=1), (away * second).sum(axis=1) + bend))
+
+    offsets, slopes, _ = at(times)
+    where, span = [times[np.argmax(np.abs(offsets))]], times[-1] - times[0]
+    for k in np.flatnonzero(slopes[:-1] * slopes[1:] < 0).tolist():
+        search = zero(float(times[k]), float(times[k + 1]), ROOT_LENGTH * span)
+        t = next(search)
+        with suppress(StopIteration):
+            while True:
+                _, rate, slope = at(t)[:, 0].tolist()
+                t = search.send((rate, slope))
+        where.append(t)
+    sizes = np.abs(at(np.array(where))[0])
+    worst = int(np.argmax(sizes))
+    return float(where[worst]), float(sizes[worst])
 
 
 def dwell(

@@ -83,6 +83,40 @@ def test_how_straight_hoekens_path_is():
     assert near.deviation < 0.01 * np.ptp(path.real)  # that is what it is for
 
 
+@pytest.mark.parametrize(("steps", "slack"), [(24, 1e-6), (60, 1e-8), (180, 1e-10)])
+def test_that_a_path_is_farthest_between_the_times_that_were_looked_at(steps, slack):
+    """Against the greatest distance of the closed form, from the same line and circle."""
+    found = solved(hoeken(), steps + 1)
+    place, u = np.array([123.0, 400.0]), np.array([0.8, 0.6])
+    near = found.straightness("P", line=(place, place + u))
+    circle = found.roundness("P", circle=(150.0, 300.0, 90.0))
+
+    def off(t):
+        path = hoeken_path(2 * np.pi * t) - complex(*place)
+        return np.abs((path * np.conj(complex(*u))).imag)
+
+    def away(t):
+        return np.abs(np.abs(hoeken_path(2 * np.pi * t) - (150 + 300j)) - 90)
+
+    for measured, by_hand in ((near, off), (circle, away)):
+        t = np.linspace(0, 1, 400_001)
+        assert measured.deviation == pytest.approx(by_hand(t).max(), rel=slack)
+        # its own time is an extreme: the slope of the closed form is zero there
+        h = 1e-5
+        assert abs(by_hand(measured.t + h) - by_hand(measured.t - h)) / (2 * h) < 1.0
+
+
+def test_that_points_have_one_rule_of_names():
+    """A joint that is no output is a column as other points are; a column is no point."""
+    found = solved(hoeken())
+    np.testing.assert_array_equal(found["x_B"], found["B.x"])
+    for name in ("x_B", "B.x"):
+        with pytest.raises(kc.InputError, match="Name the point: 'B'"):
+            found.straightness(name)
+    with pytest.raises(kc.InputError, match="x_nothing"):
+        found["x_nothing"]
+
+
 def test_that_a_part_can_be_a_range_of_a_column():
     found = solved(hoeken())
     by_angle = found.straightness("P", {"crank.phi": (0.5 * math.pi, 1.5 * math.pi)})
@@ -93,7 +127,7 @@ def test_that_a_part_can_be_a_range_of_a_column():
 def test_a_given_line_and_circle():
     found = solved(hoeken())
     level = found.straightness("P", (0.25, 0.75), line=((0, 400), (1, 400)))
-    path = hoeken_path(2 * np.pi * np.linspace(0.25, 0.75, 721))
+    path = hoeken_path(2 * np.pi * np.linspace(0.25, 0.75, 400_001))
     assert level.deviation == pytest.approx(np.abs(path.imag - 400).max(), abs=1e-8)
     circle = found.roundness("B", circle=(200, 1, 250))
     assert circle.deviation == pytest.approx(1.0, rel=0.05)
