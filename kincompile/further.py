@@ -47,6 +47,7 @@ def makers_of(
     makers: dict[Kind[Any], Callable[..., Any]] = {
         kinds.POINTS: partial(_joint_points, system),
         kinds.DRIVERS: lambda: system.drivers_at,
+        kinds.FOUR_BARS: partial(_four_bars, system),
         kinds.JOINTS: partial(_joints, system),
     }
     if len(system.coordinates) <= LARGEST_REDUNDANT:
@@ -76,6 +77,13 @@ def _stepper(module: ModuleType, program: Program) -> Callable[..., Any]:
 def _joints(system: ConstraintSystem) -> dict[str, tuple[str, ...]]:
     """Return the bodies of each constraint, by its name."""
     return {item.name: tuple(body.name for body in item.bodies) for item in system.constraints}
+
+
+def _four_bars(system: ConstraintSystem) -> Callable[..., Any]:
+    """Return what gives the four-bars with parameters."""
+    from kincompile.model.four_bars import four_bars_at
+
+    return partial(four_bars_at, system)
 
 
 def _joint_points(system: ConstraintSystem) -> Compiled:

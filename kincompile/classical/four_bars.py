@@ -18,6 +18,7 @@ from kincompile.errors import InputError
 from kincompile.model.expressions import t
 from kincompile.model.sketch import Sketch
 from kincompile.names import listed
+from kincompile.runtime.results.grashof import margin_of
 from kincompile.runtime.solve import solve
 
 if TYPE_CHECKING:
@@ -272,10 +273,9 @@ def _circuit(lengths: Sequence[float], at_b: Array, at_o: Array) -> Array:
 
     A linkage with no link that can turn wholly, by Grashof's condition, has one circuit.
     """
-    order = sorted(lengths)
-    if order[0] + order[3] >= order[1] + order[2]:
+    if margin_of(lengths) <= 0:
         return np.zeros_like(at_b)
-    return at_b if lengths.index(order[0]) < 2 else at_o
+    return at_b if lengths.index(min(lengths)) < 2 else at_o
 
 
 def _defects(times: Array, folded: Array, circuit: Array) -> str:

@@ -14,6 +14,7 @@ import time
 import warnings
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from kincompile.design.explore import Budget, Plan, explore
 from kincompile.design.finish import Norm, finished
 from kincompile.design.fitted import Counts, Fit, fitted
 from kincompile.design.judge import distinct, judge
-from kincompile.design.targets import Limit, Moves, Passing, Shaped, TimeRatio
+from kincompile.design.targets import Grashof, Limit, Moves, Passing, Shaped, TimeRatio
 from kincompile.design.trial import EXCESS, Workbench
 from kincompile.design.variation import require_mechanism
 from kincompile.errors import InputError, KincompileWarning, UnsupportedError
@@ -125,7 +126,7 @@ def fit(
     """
     begun = time.perf_counter()
     model = require_mechanism(model, "kc.fit")
-    wanted = _targets(targets)
+    wanted = _targets(targets, model)
     fixed = dict(mapping_of(p, "p"))
     names, limits = _read_bounds(model, parameters, bounds, fixed)
     budget = {"seconds": seconds, "evaluations": evaluations}
@@ -161,9 +162,9 @@ def fit(
     return replace(found[0], others=tuple(found[1:]), dropped=judged.dropped)
 
 
-def _targets(given: Any) -> list[Target]:
-    """Return the targets as a list; refuse anything else."""
-    kinds = (Passing, Shaped, TimeRatio, Limit, Moves)
+def _targets(given: Any, model: Mechanism) -> list[Target]:
+    """Return the targets as a list, with types of four-bars as limits; refuse anything else."""
+    kinds = (Passing, Shaped, TimeRatio, Limit, Moves, Grashof)
     found = [given] if isinstance(given, kinds) or not isinstance(given, Iterable) else list(given)
     problems = [
         f"{item!r} is not a target: make one with kc.targets.path, value, pose, time_ratio or limit"
@@ -174,7 +175,9 @@ def _targets(given: Any) -> list[Target]:
         problems.append("there is nothing to reach: give a path, values, poses or a time ratio")
     if problems:
         raise InputError(problems)
-    return found
+    system = model.system()
+    parts = [item.limits(system) if isinstance(item, Grashof) else [item] for item in found]
+    return list(chain.from_iterable(parts))
 
 
 def _read_bounds(

@@ -10,6 +10,7 @@ kc.targets.circular("P", (0.2, 0.7), within=0.1)               or a part of a ci
 kc.targets.dwell("ram.x", (0.4, 0.6), within=0.5)              an output rests
 kc.targets.limit("mu", 40 * kc.deg, 140 * kc.deg)           a transmission angle, over the motion
 kc.targets.limit(b / a, most=4)                                of dimensions
+kc.targets.grashof("crank-rocker")                             the type of a four-bar
 kc.targets.moves()                                             assembled at all times: full rotation
 """
 
@@ -24,8 +25,10 @@ import sympy
 
 from kincompile.errors import InputError
 from kincompile.model.expressions import number_in
+from kincompile.model.four_bars import four_bar_loops
 from kincompile.model.tasks import PART
-from kincompile.names import column_name, shown
+from kincompile.names import column_name, listed, shown, suggestion
+from kincompile.runtime.results.grashof import ROLES, TRIPLE, four_bar_with, non_grashof, room
 from kincompile.runtime.results.shapes import nearest_circle, nearest_level, nearest_line
 
 if TYPE_CHECKING:
@@ -34,10 +37,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.results.shapes import Nearest
 
     Array = NDArray[np.float64]
-    Target: TypeAlias = "Passing | Shaped | TimeRatio | Limit | Moves"
+    Target: TypeAlias = "Passing | Shaped | TimeRatio | Limit | Moves | Grashof"
 
 MOST_POINTS = 1000
 """Points of one target."""
@@ -116,6 +120,28 @@ class Limit:
     least: float
     most: float
     title: str
+
+
+@dataclass(frozen=True, slots=True)
+class Grashof:
+    """A four-bar is to be of a type; its links are those of the model, which makes limits of it."""
+
+    type: str
+    link: str | None
+    margin: float
+
+    def limits(self, system: ConstraintSystem) -> list[Limit]:
+        """Return the limits of the lengths, whose smallest room is the margin of Grashof's rule."""
+        loop = four_bar_with(four_bar_loops(system), self.link)
+        title = f"{self.type} of {' '.join(loop.joints)}"
+        if self.type == TRIPLE:
+            return [Limit(non_grashof(loop.lengths), self.margin, math.inf, title)]
+        shortest = ROLES.index(self.type)
+        others = [name for k, name in enumerate(loop.links) if k != shortest]
+        return [
+            Limit(value, self.margin, math.inf, f"{title}, with {name} as l")
+            for value, name in zip(room(loop.lengths, shortest), others, strict=True)
+        ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -356,6 +382,37 @@ def limit(what: Any, least: Any = -math.inf, most: Any = math.inf, *, title: str
     if not isinstance(what, sympy.Expr):
         what = column_name(str(what))
     return Limit(what, low, high, about)
+
+
+def grashof(type: str, link: str | None = None, *, margin: float = 0.0) -> Grashof:  # noqa: A002
+    """Return the demand that a four-bar of the model is of a type, by Grashof's rule.
+
+    Parameters
+    ----------
+    type
+        ``"crank-rocker"``, ``"rocker-crank"``, ``"double-crank"``, ``"double-rocker"`` or
+        ``"triple-rocker"``. The link on the ground that is driven is the crank.
+    link
+        A link that it has; a model with one four-bar needs none.
+    margin
+        By how much p + q is to be above s + l at least [length]; of a triple-rocker, how large at
+        least the product of the three differences of pairs, by the square of all lengths.
+
+    Raises
+    ------
+    InputError
+        If there is no such type, or the margin is negative.
+    """
+    if type not in (*ROLES, TRIPLE):
+        near = suggestion(type, (*ROLES, TRIPLE)) or "."
+        raise InputError(
+            f"there is no type {shown(type)} of a four-bar{near} There are "
+            f"{listed((*ROLES, TRIPLE))}."
+        )
+    least = _number(margin, "the margin of Grashof's rule")
+    if least < 0:
+        raise InputError(f"the margin of Grashof's rule is {least:g}: give zero or more")
+    return Grashof(type, link, least)
 
 
 def moves() -> Moves:

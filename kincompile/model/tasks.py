@@ -267,6 +267,24 @@ class Limit:
 
 
 @declared
+class Grashof:
+    """A four-bar is of a type, by Grashof's rule."""
+
+    grashof: Any = given(
+        kind.one_of(
+            ("crank-rocker", "rocker-crank", "double-crank", "double-rocker", "triple-rocker")
+        ),
+        "The type.",
+    )
+    link: str | None = given(
+        kind.TEXT, "A link that it has, where there are several.", default=None, kw_only=True
+    )
+    margin: float = given(
+        kind.CONSTANT, "The least p + q - s - l.", default=0.0, unit="length", kw_only=True
+    )
+
+
+@declared
 class Moves:
     """The mechanism moves through all times of the model."""
 
@@ -275,6 +293,7 @@ class Moves:
 
 TARGETS: Mapping[str, type] = {
     "path": Path, "value": Value, "pose": Pose, "straight": Straight, "circular": Circular,
-    "dwell": Dwell, "time_ratio": TimeRatio, "limit": Limit, "moves": Moves,
+    "dwell": Dwell, "time_ratio": TimeRatio, "limit": Limit, "grashof": Grashof,
+    "moves": Moves,
 }  # fmt: skip
 """Targets of a fit: functions of `kc.targets`, and what a file says of each."""

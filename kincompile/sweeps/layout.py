@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +15,9 @@ from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.inputs import names_of
 from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.runtime.results.forces import force_measure, forces
+from kincompile.runtime.results.grashof import four_bar_types, four_bar_with
 from kincompile.runtime.results.measures import measures_together
+from kincompile.runtime.results.shapes import path_columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +37,9 @@ MEASURES = (
 )  # fmt: skip
 """What can be kept of an output, as `sol.measures()` calls it."""
 
+OF_MOTION = ("straightness", "roundness", "dwell", "grashof")
+"""What can be kept of the path of a point, of a column, and of the four-bar that has a link."""
+
 OF_FORCES = ("peak", "least", "t_least", "greatest", "t_greatest", "mean", "rms")
 """What can be kept of a force, at the times alone, as `kc.forces(sol).measures()` calls it."""
 
@@ -49,6 +56,7 @@ class Kept:
     column: str  # the column, or the output that is measured
     measure: str = ""  # one of `MEASURES` or `OF_FORCES`; "" of a column over time
     is_force: bool = False  # whether it is one of those that `kc.forces` gives
+    part: tuple[Any, ...] = ()  # of the motion, or how near, what is between brackets
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +81,14 @@ class Layout:
         for item in self.kept:
             if item.measure and item.is_force:
                 found[item.name] = _measured_forces(bearing, item)
-        measured = [item for item in self.kept if item.measure and not item.is_force]
+        measured = [
+            item
+            for item in self.kept
+            if item.measure and not item.is_force and item.measure not in OF_MOTION
+        ]
+        for item in self.kept:
+            if item.measure in OF_MOTION:
+                found[item.name] = _measured_motions(solution, item)
         for item in measured:
             found[item.name] = np.full(len(solution.q), np.nan)
         names = {item.column for item in measured}
@@ -103,6 +118,26 @@ def bearing_of(solution: Solution) -> Solution:
     values = np.stack([values for values, _ in sizes.values()], axis=-1)
     units = {name: unit for name, (_, unit) in sizes.items()}
     return found.motion.observing(found.motion.observed.joined(tuple(sizes), units, values))
+
+
+def _measured_motions(solution: Solution, item: Kept) -> NDArray[np.generic]:
+    """Return a measure of whole motions in each variant, (B,), NaN where there is none."""
+    found = np.full(len(solution.q), np.nan)
+    for number in np.flatnonzero(solution.good.all(axis=1)).tolist():
+        with suppress(InputError):  # no such part of this motion
+            found[number] = _of_motion(solution.variant(number), item)
+    return found
+
+
+def _of_motion(motion: Solution, item: Kept) -> float:
+    """Return the largest distance, the time of the longest dwell, or p + q - s - l."""
+    if item.measure == "dwell":
+        return motion.dwell(item.column, *item.part).time
+    if item.measure == "grashof":
+        code = code_of(motion.require_module("its four-bars"))
+        return four_bar_with(four_bar_types(code, motion.p), item.column).margin
+    measure = motion.straightness if item.measure == "straightness" else motion.roundness
+    return measure(item.column, item.part or None).deviation
 
 
 def _measured_forces(bearing: Solution, item: Kept) -> NDArray[np.generic]:
@@ -165,14 +200,46 @@ def _column(solution: Solution, name: str, bearing: Solution | None) -> tuple[Co
         return bearing.column(name), True
 
 
+def _motion_measure(solution: Solution, given: str) -> Kept | None:
+    """Read a measure of the motion, as ``P.straightness(0.2, 0.7)``; None of any other."""
+    form = re.fullmatch(r"(.+)\.(\w+)(?:\((.*)\))?", str(given))
+    if form is None or form[2] not in OF_MOTION:
+        return None
+    of, measure = form[1], form[2]
+    words = re.findall(r"[^\s,]+", form[3] or "")
+    part: list[Any] = []
+    try:
+        part = [x if x in ("max", "min") and measure == "dwell" else float(x) for x in words]
+        fits = len(part) in {"dwell": (1, 2), "grashof": (0,)}.get(measure, (0, 2))
+    except ValueError:
+        fits = False
+    if not fits:
+        raise InputError(
+            f"{given!r}: write it as 'P.straightness', 'P.roundness(0.2, 0.7)' of a part of the "
+            "time, 'ram.x.dwell(0.5)' or 'ram.x.dwell(0.5, min)' of how near it keeps to its "
+            "greatest or least value, or 'crank.grashof' of the four-bar with that link."
+        )
+    if measure == "dwell":
+        of, unit = solution.column(of).name, TIME_UNIT
+    elif measure == "grashof":
+        code = code_of(solution.require_module("its four-bars"))
+        unit = four_bar_with(four_bar_types(code, solution.p), of).unit
+    else:
+        unit = solution.column(path_columns(solution, of)[0]).unit
+    name = "_".join((of, measure, *words))
+    return Kept(name, unit, of, measure, part=tuple(part))
+
+
 def _measure(solution: Solution, given: str, bearing: Solution | None) -> Kept:
     """Read a measure, such as ``foot.x.stroke``."""
+    if (of_motion := _motion_measure(solution, given)) is not None:
+        return of_motion
     output, _, measure = str(given).rpartition(".")
     if measure not in (*MEASURES, *OF_FORCES) or not output:
-        near = suggestion(measure, MEASURES) or "."
+        near = suggestion(measure, (*MEASURES, *OF_MOTION)) or "."
         raise InputError(
             f"there is no measure {given!r}{near} Write the output and what is measured of it, "
-            f"such as 'foot.x.stroke'; there are {listed(MEASURES)}."
+            f"such as 'foot.x.stroke'; there are {listed((*MEASURES, *OF_MOTION), 20)}."
         )
     column, is_force = _column(solution, output, bearing)
     if measure not in (OF_FORCES if is_force else MEASURES):

@@ -225,6 +225,9 @@ UNDRIVEN: Kind[str] = Kind("undriven")
 DRIVERS: Kind[Callable[[float, Array], Sequence[tuple[Any, ...]]]] = Kind("drivers")
 """What describes the drivers at a time and parameters."""
 
+FOUR_BARS: Kind[Callable[[Array], Sequence[tuple[Any, ...]]]] = Kind("four-bars")
+"""What describes the four-bars with parameters."""
+
 SENSITIVITIES: Kind[Compiled | None] = Kind(
     "sensitivities",
     "and that has no sensitivities: differentiate a part of it, or",

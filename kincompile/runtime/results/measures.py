@@ -26,6 +26,7 @@ from kincompile.html import Shown
 from kincompile.names import column_name, listed, suggestion
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.driver_range import DriverRange, driver_ranges, driver_table
+from kincompile.runtime.results.grashof import FourBarType, four_bar_table, four_bar_types
 from kincompile.runtime.results.observed import ObservedMotion, derivative, together
 from kincompile.runtime.results.plot import runs
 from kincompile.runtime.singular.curve import zero
@@ -94,11 +95,14 @@ class Measures(Shown):
         In the order of the columns.
     drivers : tuple of DriverRange
         How far each driver can go; of a module that was loaded from a file none are known.
+    four_bars : tuple of FourBarType
+        The Grashof type of each four-bar, likewise.
     """
 
     name: str
     outputs: tuple[OutputMeasures, ...]
     drivers: tuple[DriverRange, ...]
+    four_bars: tuple[FourBarType, ...] = ()
 
     def __getitem__(self, name: str) -> OutputMeasures | DriverRange:
         """Return the measures of an output, or the range of a driver, by name."""
@@ -117,26 +121,28 @@ class Measures(Shown):
         return f"{self.name}: {listed([x.name for x in self.outputs]) or 'no outputs'}"
 
     def to_text(self) -> str:
-        """Return tables of outputs and drivers."""
+        """Return tables of outputs, drivers and four-bars."""
         return self.table()
 
     def table(self, angle_unit: str = "rad") -> str:
-        """Return tables of outputs and drivers; angles in ``"rad"`` or ``"deg"``."""
+        """Return tables of outputs, drivers and four-bars; angles in ``"rad"`` or ``"deg"``."""
         return "\n\n".join(filter(None, self.tables(angle_unit)))
 
-    def tables(self, angle_unit: str) -> tuple[str, str]:
-        """Return the table of outputs and that of drivers, each "" where there are none."""
-        outputs, drivers = (
+    def tables(self, angle_unit: str) -> tuple[str, str, str]:
+        """Return the tables of outputs, drivers and four-bars, each "" where there are none."""
+        outputs, drivers, four_bars = (
             _output_table(self.outputs, angle_unit),
             driver_table(self.drivers, angle_unit),
+            four_bar_table(self.four_bars),
         )
-        return "\n".join(outputs), "\n".join(drivers)
+        return "\n".join(outputs), "\n".join(drivers), "\n".join(four_bars)
 
 
 def measures(solution: MotionTable, code: Compiled, p: Array) -> Measures:
     """Measure the motion of a mechanism with parameters p, as `Solution.measures` describes."""
     found = output_measures(solution, code, p)
-    return Measures(solution.name, found, driver_ranges(solution, code, p))
+    ranges = driver_ranges(solution, code, p)
+    return Measures(solution.name, found, ranges, four_bar_types(code, p))
 
 
 def output_measures(

@@ -217,7 +217,7 @@ def path_deviation(
     if any(name.startswith("e0_") for name in solution.coordinates):
         raise InputError(f"{solution.name} moves in space: paths are compared in the plane only.")
     times, inside = _part(solution, between)
-    names = _of_point(solution, point)
+    names = path_columns(solution, point)
     curves = [_curve(solution, name) for name in names]
     values = np.column_stack([curve(times) for curve in curves])[inside]
     times = times[inside]
@@ -231,7 +231,7 @@ def path_deviation(
     )  # fmt: skip
 
 
-def _of_point(solution: MotionTable, point: str) -> tuple[str, str]:
+def path_columns(solution: MotionTable, point: str) -> tuple[str, str]:
     """Return the names of both coordinates of a point; of a column say which point it is of."""
     names = f"{point}.x", f"{point}.y"
     try:

@@ -11,7 +11,9 @@ import numpy as np
 
 from kincompile.criteria import NOISE
 from kincompile.errors import InputError
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.results.columns import TIME_UNIT, largest, shown_unit, titled
+from kincompile.runtime.results.grashof import four_bar_types
 from kincompile.runtime.results.solution import require_solution
 from kincompile.runtime.status import Status
 from kincompile.tables import counted, table, without_noise
@@ -135,6 +137,9 @@ def _json(solution: Solution, angle_unit: str) -> str:
     document["units"] = _units(solution, angle_unit)
     if solution.observed.names:
         document["outputs"] = solution.observed.names
+    if solution.q.ndim == 2 and solution.module is not None:
+        four_bars = four_bar_types(code_of(solution.module), solution.p)
+        document |= {"four_bars": [item.as_dict() for item in four_bars]} if four_bars else {}
     document |= {
         "parameters": {k: np.asarray(v).tolist() for k, v in solution.parameters.items()},
         "statuses": {str(int(status)): status.sentence for status in Status},
@@ -160,19 +165,19 @@ def summary(solution: Solution, angle_unit: str = "rad") -> str:
     """Return the measures, the extremes of every coordinate, and a line on how the solving went.
 
     Of variants there is a table with a line for each. The outputs of
-    `Solution.measures` come first, and its drivers after the coordinates. Per coordinate there are
-    the unit, the least and largest value with their times, and the largest absolute values of first
-    and second derivative [unit/s, unit/s^2]; at the end stand the points by status, the Newton
-    iterations and the largest residual. Points that were not found do not count; `angle_unit` is
-    ``"rad"`` or ``"deg"``.
+    `Solution.measures` come first, its drivers and four-bars after the coordinates. Per coordinate
+    there are the unit, the least and largest value with their times, and the largest absolute
+    values of first and second derivative [unit/s, unit/s^2]; at the end stand the points by status,
+    the Newton iterations and the largest residual. Points that were not found do not count;
+    `angle_unit` is ``"rad"`` or ``"deg"``.
     """
     if solution.q.ndim > 2:
         return "\n".join(_variants(solution, angle_unit))
-    outputs = drivers = ""
+    outputs = drivers = four_bars = ""
     if np.isfinite(solution.q_dot).any():
-        outputs, drivers = solution.measures().tables(angle_unit)
+        outputs, drivers, four_bars = solution.measures().tables(angle_unit)
     coordinates = "\n".join(_table(solution, angle_unit))
-    return "\n\n".join(filter(None, (outputs, coordinates, drivers, _verdict(solution))))
+    return "\n\n".join(filter(None, (outputs, coordinates, drivers, four_bars, _verdict(solution))))
 
 
 def _variants(solution: Solution, angle_unit: str) -> list[str]:

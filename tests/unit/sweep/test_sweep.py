@@ -56,6 +56,28 @@ def test_measures_are_those_of_a_solution():
     assert found["y_tip_t_greatest"].attrs["units"] == "s"
 
 
+def test_measures_of_whole_motions():
+    """Dwells of a crank by arccosine, distances of a path as of each motion, Grashof's rule."""
+    t = np.linspace(0, 2, 81)
+    names = ["tip.x.dwell(0.05)", "tip.roundness", "tip.straightness(0.25, 1)"]
+    found = sweep(measures=names, t=t).to_xarray()
+    near = np.arccos(1 - 0.05 / LENGTHS)[:, None] / SPEEDS
+    np.testing.assert_allclose(found["x_tip_dwell_0.05"], near, rtol=1e-6)
+    assert found["x_tip_dwell_0.05"].attrs["units"] == "s"
+    np.testing.assert_allclose(found["tip_roundness"], 0, atol=1e-6)
+    one = kc.solve(kc.compile(crank()), t, {"a": 0.9, "omega": 1.0}).straightness("tip", (0.25, 1))
+    at = found["tip_straightness_0.25_1"]
+    assert float(at.sel(a=0.9, omega=1.0)) == pytest.approx(one.deviation, rel=1e-12)
+    assert at.attrs["units"] == "m"
+
+
+def test_that_a_sweep_keeps_grashofs_margin():
+    hoeken = kc.linkages.hoeken().mechanism()
+    margins = sweep(hoeken, {"OC": [1.5, 2.0, 3.0]}, measures=["rocker.grashof"], t=[0, 0.01])
+    # s = 1 and l = 2.5, or 3, with p + q the other two
+    np.testing.assert_allclose(margins["rocker.grashof"], [0.5, 1.0, 1.0], atol=1e-12)
+
+
 @pytest.mark.parametrize("target", ["numpy", pytest.param("c", marks=pytest.mark.slow)])
 def test_forces_are_kept_as_columns_and_measures(target):
     m = crank()

@@ -156,6 +156,10 @@ def test_a_place_that_no_sweep_wrote_is_refused(ending, tmp_path):
         ({"columns": [], "measures": []}, "nothing is kept"),
         ({"measures": ["tip.x.strok"]}, "no measure 'tip.x.strok'; did you mean 'stroke'"),
         ({"measures": ["x_arm.stroke"]}, "x_arm is a coordinate; measures are defined for outputs"),
+        ({"measures": ["tip.x.dwell"]}, "'tip.x.dwell': write it as"),
+        ({"measures": ["tip.straightness(1)"]}, "write it as 'P.straightness'"),
+        ({"measures": ["tip.x.roundness"]}, "Name the point: 'tip'"),
+        ({"measures": ["arm.grashof"]}, "There are 0 four-bars with the link 'arm'"),
         ({"columns": ["a.b"], "measures": ["x.y"]}, "2 problems"),
         ({"chunk": 0}, "chunk is 0"),
         (
