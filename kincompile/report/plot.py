@@ -38,11 +38,18 @@ class Layer(NamedTuple):
 
 
 def plot_svg(
-    title: str, x_label: str, y_label: str, layers: Sequence[Layer], *, is_true: bool = False
+    title: str,
+    x_label: str,
+    y_label: str,
+    layers: Sequence[Layer],
+    *,
+    is_true: bool = False,
+    rows: Sequence[str] = (),
 ) -> str:
     """Return a plot as an `svg` element; the title says what it shows, for who cannot see it.
 
-    `is_true` gives both axes one scale, as a path wants.
+    `is_true` gives both axes one scale, as a path wants. `rows` are names that stand at y = 0, 1,
+    2, ... in place of numbers, as bars want.
     """
     numbers = [
         _extent(np.concatenate([np.ravel(part) for part in parts]))
@@ -67,8 +74,9 @@ def plot_svg(
         return f"{LEFT + across:.1f} {HEIGHT - BOTTOM - up:.1f}"
 
     inside = [
-        *_axes(numbers, pair),
+        *_axes(numbers, pair, bool(rows)),
         *(_drawn(item, pair) for item in layers),
+        *_rows(rows, numbers[0][0], pair),
         label(x_label, x=LEFT + wide / 2, y=HEIGHT - 6, text_anchor="middle", fill="var(--ink)"),
         label(y_label, x=0, y=13, fill="var(--ink)"),
         *_legend(layers),
@@ -101,18 +109,29 @@ def _ticks(low: float, high: float) -> list[tuple[float, str]]:
 
 
 def _axes(
-    numbers: Sequence[tuple[float, float]], pair: Callable[[Iterable[float]], str]
+    numbers: Sequence[tuple[float, float]],
+    pair: Callable[[Iterable[float]], str],
+    has_rows: bool,
 ) -> Iterator[str]:
-    """Yield the lines of the grid, with their numbers."""
+    """Yield the lines of the grid, with their numbers; across only where there are no rows."""
     (x0, x1), (y0, y1) = numbers
     for x, text in _ticks(x0, x1):
         yield element("path", d=outline([(x, y0), (x, y1)], False, pair), stroke="var(--line)")
         at = pair((x, y0)).split()[0]
         yield label(text, x=at, y=HEIGHT - 24, text_anchor="middle", fill="var(--quiet)")
-    for y, text in _ticks(y0, y1):
+    for y, text in () if has_rows else _ticks(y0, y1):
         yield element("path", d=outline([(x0, y), (x1, y)], False, pair), stroke="var(--line)")
         height = float(pair((x0, y)).split()[1]) + 4
         yield label(text, x=LEFT - 6, y=f"{height:.1f}", text_anchor="end", fill="var(--quiet)")
+
+
+def _rows(
+    names: Sequence[str], left: float, pair: Callable[[Iterable[float]], str]
+) -> Iterator[str]:
+    """Yield the names of rows, in the plot at its left."""
+    for row, name in enumerate(names):
+        x, y = map(float, pair((left, row)).split())
+        yield label(name, x=f"{x + 4:.1f}", y=f"{y + 4:.1f}", fill="var(--ink)")
 
 
 def _drawn(item: Layer, pair: Callable[[Iterable[float]], str]) -> str:

@@ -1,5 +1,6 @@
 """`kincompile tolerance` and `kincompile fit`: from TOML alone to tables, a page and a model."""
 
+import re
 import tomllib
 
 import numpy as np
@@ -79,7 +80,20 @@ def test_tolerances_of_a_file_are_those_of_python(kincompile, file, tmp_path):
     assert done.stderr == f"Wrote {page}\n"
     text = page.read_text(encoding="utf-8")
     assert "clearance of B" in text
-    assert text.count("<img") == 2
+    # Of each column a plot of our own over time, and a bar for each source, the greatest on top.
+    assert "<img" not in text
+    assert text.count("<svg") == 4
+    for column in found.columns:
+        svg = next(x for x in text.split("<svg")[1:] if f"{column} at t = " in x)
+        named = re.findall(r">([^<>]+) ([\d.]+) %</text>", svg)
+        low, high = (
+            part[found.widest(column), found.columns.index(column)]
+            for part in (found.low, found.high)
+        )
+        order = np.argsort(high - low, kind="stable")
+        assert [name for name, _ in named] == [found.sources[j] for j in order]
+        parts = found.contributions(column)[found.widest(column)][order]
+        np.testing.assert_allclose([float(part) for _, part in named], parts, atol=0.05)
 
 
 def test_options_choose_times_values_and_samples(kincompile, file):
