@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from kincompile.emitters.evaluators import input_names, schedule
 from kincompile.emitters.naming import NameTable
 from kincompile.emitters.printer import Printer
-from kincompile.emitters.registry import load_grouped_form, load_one, load_target
+from kincompile.emitters.registry import load_ends, load_grouped_form, load_one, load_target
 from kincompile.emitters.target import Emitted
 from kincompile.ir.inline import InlineProgram
 
@@ -35,5 +35,5 @@ def emit_program(
         functions[function] = target.function(function, code, listing, printer)
         called.update(listing.functions)
     files = target.files(code, functions, called)
-    needs = one.needs(code) if one else ""
-    return Emitted(program.name, files, unsolvable=program.unsolvable, needs=needs)
+    needs, ends = one.needs(code) if one else "", load_ends(name, next(iter(files)))
+    return Emitted(program.name, files, unsolvable=program.unsolvable, needs=needs, ends=ends)

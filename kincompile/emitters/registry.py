@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from kincompile.emitters.target import Emitted, OneTarget, Start, Target
     from kincompile.emitters.transmission import OneTransmission, TransmissionTarget
@@ -60,6 +60,13 @@ def load_target(name: str) -> Target:
     """Return a target, whose modules are loaded now."""
     target: Target = import_module(f"{TARGETS[name].folder}.target")
     return target
+
+
+def load_ends(name: str, main: str) -> Mapping[str, str]:
+    """Return what a main file has at its end, by the ending of its name, where a target says so."""
+    target = load_target(name)
+    found: Mapping[str, str] = target.ends(main) if hasattr(target, "ends") else {}
+    return found
 
 
 def load_one(name: str, start: Start) -> OneTarget:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -44,6 +43,8 @@ class Emitted(Shown):
         for; "" where they can.
     needs
         What code for a controller needs there: bytes and operations; "" for all other code.
+    ends
+        What the main file has at its end, by the ending of another name that it is given.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Emitted(Shown):
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     unsolvable: str = ""
     needs: str = ""
+    ends: Mapping[str, str] = field(default_factory=dict)
 
     def to_text(self) -> str:
         """Return which files there are."""
@@ -101,19 +103,13 @@ class Emitted(Shown):
         paths = []
         for k, (name, text) in enumerate(self.files.items()):
             path = Path(folder) / (main if main and k == 0 else name)
-            write_atomically(path, text + _export(text) if path.suffix == ".mjs" else text)
+            write_atomically(path, text + (self.ends.get(path.suffix, "") if k == 0 else ""))
             paths.append(path)
         if self.arrays:
             path = Path(folder) / self.companions[-1]
             write_atomically(path, _packed(self.arrays))
             paths.append(path)
         return tuple(paths)
-
-
-def _export(text: str) -> str:
-    """Return the line that exports from an ES module what a script gives to require()."""
-    found = re.search(r"module\.exports = (\w+);", text)
-    return f"\nexport default {found[1]};\n" if found else ""
 
 
 def _packed(arrays: Mapping[str, NDArray[Any]]) -> bytes:

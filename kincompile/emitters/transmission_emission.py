@@ -9,6 +9,7 @@ from kincompile.emitters.naming import NameTable
 from kincompile.emitters.printer import Printer
 from kincompile.emitters.registry import (
     TARGETS,
+    load_ends,
     load_one,
     load_one_transmission,
     load_target,
@@ -60,4 +61,5 @@ def emit_transmission(
     listing = schedule(code.code, ("outputs",), names, table)
     printer = Printer(owner.DIALECT, code.code.nodes, listing.names, program.name)
     own = Transmission(code, listing, printer, tuple(q), tuple(u))
-    return Emitted(program.name, language.files(own), needs=one.needs(own) if one else "")
+    files, needs = language.files(own), one.needs(own) if one else ""
+    return Emitted(program.name, files, needs=needs, ends=load_ends(target, next(iter(files))))

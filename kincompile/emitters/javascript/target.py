@@ -104,7 +104,7 @@ def files(
         "units": indented(wrapped(f'"{name}": "{unit}"' for name, unit in units.items()), 2),
         "corners": str(program.corners).lower(),
         "matrices": indented(_matrices(code), 2),
-        "variable": NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(program.name),
+        "variable": variable_of(program.name),
         "tables": indented(splines(program, "const {} = {{", "[")),
         "table_names": ", ".join(program.tables),
         "spline": spline_function(),
@@ -118,6 +118,16 @@ def files(
         ),
     }
     return {f"{program.name}.js": fill("javascript/module.js.jinja", data)}
+
+
+def variable_of(name: str) -> str:
+    """Return the variable that a script of a name declares."""
+    return NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(name)
+
+
+def ends(main: str) -> Mapping[str, str]:
+    """Return what a script has at its end in a file of another ending: an ES module exports."""
+    return {".mjs": f"\nexport default {variable_of(main.removesuffix('.js'))};\n"}
 
 
 def spline_function() -> str:

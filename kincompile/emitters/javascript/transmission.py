@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 from kincompile.emitters.constants import items, splines
 from kincompile.emitters.javascript.functions import WRITE
 from kincompile.emitters.javascript.march import JavaScriptSolver
-from kincompile.emitters.javascript.target import KEYWORDS, TAKEN_BY_ENVIRONMENT, spline_function
+from kincompile.emitters.javascript.target import spline_function, variable_of
 from kincompile.emitters.lines import indented, wrapped
-from kincompile.emitters.naming import NameTable
 from kincompile.emitters.transmission import NUMBERS, statuses
 from kincompile.report.templates import fill
 from kincompile.solver.reader import transmission
@@ -33,7 +32,7 @@ def files(of: Transmission) -> Mapping[str, str]:
     numbers = {**of.sizes, **statuses(), **NUMBERS}
     data = {
         "header": "\n".join(f"// {line}".rstrip() for line in of.about()),
-        "variable": NameTable((*KEYWORDS, *TAKEN_BY_ENVIRONMENT)).take(name),
+        "variable": variable_of(name),
         "lists": indented(
             line
             for x, own in lists.items()
