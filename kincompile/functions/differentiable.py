@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile import criteria
-from kincompile.errors import InputError, SolveError, UnsupportedError
+from kincompile.errors import InputError, SolveError, UnsupportedError, package_of_extra
 from kincompile.functions.transmission import Transmission
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.problem import problem
@@ -54,9 +54,10 @@ def jax(given: ModuleType | Transmission, times: ArrayLike = 0.0) -> Callable[..
     Raises
     ------
     InputError
-        If JAX is not installed, or computes in single precision.
+        If JAX computes in single precision.
     UnsupportedError
-        If the module has no planned solve, as in grouped form, or is of an earlier version.
+        If JAX is not installed, or the module has no planned solve, as in grouped form, or is of an
+        earlier version.
     StructuralError, SolveError
         If the equations do not determine the coordinates, or cannot be assembled at `times`.
     """
@@ -68,10 +69,8 @@ def jax(given: ModuleType | Transmission, times: ArrayLike = 0.0) -> Callable[..
 
 def _double_precision() -> None:
     """Check that JAX is there and has numbers of 64 bits."""
-    try:
+    with package_of_extra("jax", "jax"):
         import jax.numpy as jnp
-    except ImportError:
-        raise InputError("kc.jax needs JAX: install it with pip install jax.") from None
     if jnp.zeros(()).dtype != np.float64:
         raise InputError(
             "JAX computes in single precision, in which no position converges. "
@@ -94,9 +93,10 @@ def _motion(module: ModuleType, times: ArrayLike) -> Callable[..., Any]:
         """Return q, q_dot and q_ddot (n,) at a time t and with parameters p (k,)."""
         t, p = jnp.asarray(t, dtype=float), _vector(p, defaults, "p", module.PARAMETERS)
         q = position(t, p)
-        factors = linear(q, t, p)[1]
-        q_dot = solved(factors, lanes["nu"](q, t, p))
-        return q, q_dot, solved(factors, lanes["gamma"](q, q_dot, t, p))
+        factors, is_missing = linear(q, t, p)[1], ~jnp.isfinite(q).all()  # a driven rate is known
+        q_dot = jnp.where(is_missing, jnp.nan, solved(factors, lanes["nu"](q, t, p)))
+        q_ddot = solved(factors, lanes["gamma"](q, q_dot, t, p))
+        return q, q_dot, jnp.where(is_missing, jnp.nan, q_ddot)
 
     return jax.jit(motion)
 
@@ -122,7 +122,7 @@ def _outputs(f: Transmission) -> Callable[..., Any]:
         still = jnp.zeros_like(q)
         y = lanes["observe"](q, still, still, jnp.zeros(()), whole) if "observe" in lanes else ()
         columns = jnp.concatenate([q, _array(y[: len(names) - len(q)])])
-        return jnp.where(is_twist, jnp.nan, columns[places])
+        return jnp.where(is_twist | ~jnp.isfinite(q).all(), jnp.nan, columns[places])
 
     return jax.jit(outputs)
 
@@ -216,7 +216,8 @@ def _positions(module: ModuleType, t_0: Any, q_0: Any, p_0: Any) -> tuple[Any, A
             return (carry[0] < 1.0) & (carry[1] > criteria.SMALLEST_PART)
 
         s, _, q = jax.lax.while_loop(goes_on, step, (0.0, 1.0, known[nearest]))
-        return jnp.where(s == 1.0, q, jnp.nan)
+        # Laws by pieces have a value at a time that is no number.
+        return jnp.where((s == 1.0) & jnp.isfinite(t) & jnp.all(jnp.isfinite(p)), q, jnp.nan)
 
     @jax.custom_jvp
     def position(t: Any, p: Any) -> Any:
