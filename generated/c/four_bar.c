@@ -1396,7 +1396,8 @@ static void walk(strip *b, const scales *s, state *at, double t, outcome *o)
         } else {
             put_at(b, at, 0, 1);
         }
-        is_stuck = !is_good && fabs(h) <= smallest;
+        // A time that is no number leaves no step.
+        is_stuck = !is_good && !(fabs(h) > smallest);
         if (is_stuck || (is_good && is_whole))
             break;
         double size = fabs(h);
@@ -2014,11 +2015,12 @@ size_t four_bar_march(const four_bar_motion *motion)
     return march(&m);
 }
 
-// A good point, by what it is judged, and where the next one is computed.
+// Where the next point is computed, by what it is judged, and the last good one. Rows of a strip
+// begin with registers where a stepper does.
 struct four_bar_stepper {
-    state at;
-    scales s;
     strip b;
+    scales s;
+    state at;
 };
 
 size_t four_bar_stepper_size(void)

@@ -1067,7 +1067,8 @@ def _walk(b, s, at, t, o):
             _copy(at, b)
         else:
             _copy(b, at)
-        is_stuck = not is_good and abs(h) <= smallest
+        # A time that is no number leaves no step.
+        is_stuck = not is_good and not (abs(h) > smallest)
         if is_stuck or (is_good and is_whole):
             break
         size = abs(h)

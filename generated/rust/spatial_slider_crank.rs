@@ -2590,7 +2590,8 @@ fn walk(b: &mut Point, s: &Scales, at: &mut State, t: f64, o: &mut Outcome) {
         } else {
             put_at(b, at);
         }
-        is_stuck = !is_good && h.abs() <= smallest;
+        // A time that is no number leaves no step.
+        is_stuck = !is_good && !(h.abs() > smallest);
         if is_stuck || (is_good && is_whole) {
             break;
         }

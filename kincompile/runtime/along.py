@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 def along(code: Compiled, p: Array, t: float) -> Compiled:
     """Return the equations at one time on lines from parameters p: the way along is their time."""
 
-    def parameters(part: Any, to: Array) -> Array:
+    def parameters(part: Any, given: Array | Sequence[float]) -> Array:
+        to = np.asarray(given)
         begin = p if to.ndim == 1 else p[:, np.newaxis]
         return np.asarray(begin + part * (to - begin))
 

@@ -56,6 +56,8 @@ class Problem(Scales):
 
     def at(self, q: Array, t: float) -> Point | None:
         """Evaluate the equations, or give None where they have no finite value."""
+        if not math.isfinite(norm(q)):  # which functions of a module refuse
+            return None
         point = self.engine.evaluate(q, t)
         return point if math.isfinite(norm(point.Phi)) else None
 

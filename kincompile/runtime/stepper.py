@@ -19,7 +19,7 @@ import numpy as np
 from kincompile.criteria import CORNER, MAX_ITERATIONS, TOLERANCE
 from kincompile.errors import AssemblyWarning, InputError
 from kincompile.names import listed
-from kincompile.runtime.along import lead, lead_together
+from kincompile.runtime.along import lead
 from kincompile.runtime.engine.code import STEPPER, column_meant
 from kincompile.runtime.follow import follow
 from kincompile.runtime.inputs import read_inputs
@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 
     from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.inputs import Inputs, Values
+
+EXACT = 53
+"""Binary digits of whole numbers that floats hold."""
 
 NOT_LED = (
     "{name} cannot go from the parameters that it has at t = {t:.10g} to those that are given: on "
@@ -156,10 +159,11 @@ class Stepper:
         Where it stands; None before the first call that succeeds.
     """
 
-    def __init__(self, inputs: Inputs, guess: Values, through: str | None) -> None:
+    def __init__(self, inputs: Inputs) -> None:
         self.now: Instant | None = None
-        self._inputs, self._code, self._p = inputs, inputs.code, inputs.p
-        self._guess, self._through = guess, through
+        self._own = self._inputs = inputs  # as it was made, and as it was reset
+        self._code, self._p = inputs.code, inputs.p
+        self._p.setflags(write=False)
         self._places = {name: k for k, name in enumerate(self._code.parameters)}
         self._make = inputs.code.stepper
         if self._make is None and inputs.code.has(STEPPER):
@@ -190,9 +194,11 @@ class Stepper:
         InputError
             When a value has the wrong name, shape, type or is not finite.
         """
+        own = self._own
         if guess is not None:
-            _read(self._code.module, 0.0, None, guess)
-            self._guess = guess
+            found = _read(self._code.module, 0.0, None, guess)
+            own = replace(own, guess=found.guess, without_guess=found.without_guess)
+        self._inputs = own
         self._begin()
 
     def __call__(self, t: float, p: Values = None, **parameters: float) -> Instant:
@@ -242,22 +248,24 @@ class Stepper:
                 "by name, or in p."
             )
         values: Any = named if p is None else p
+        own: Any = None
         if isinstance(values, Mapping):
-            if all(isinstance(x, float | int) for x in values.values()) and (
-                values.keys() <= self._places.keys()
-            ):
+            if values.keys() <= self._places.keys() and all(map(_is_plain, values.values())):
                 own = self._p.copy()
                 for name, value in values.items():
                     own[self._places[name]] = value
-                values = own
-            else:  # which is refused, unless numbers are of another kind
+            else:
                 values = dict(zip(self._places, self._p.tolist(), strict=True)) | dict(values)
-        elif type(values) is np.ndarray and values.dtype == float:
-            values = values.copy()
-        is_vector = type(values) is np.ndarray and values.shape == self._p.shape
-        if is_vector and math.isfinite(values.sum()):
-            return np.asarray(values)
-        return _read(self._code.module, 0.0, values, None).p
+        elif (
+            type(values) is np.ndarray
+            and (values.dtype, values.shape) == (self._p.dtype, self._p.shape)
+            and all(map(math.isfinite, values.tolist()))
+        ):
+            own = values.copy()
+        if own is None:  # what is refused, or numbers of another kind
+            own = _read(self._code.module, 0.0, values, None).p
+        own.setflags(write=False)
+        return np.asarray(own)
 
     def _is_corner(self, t: float, p: Array) -> bool:
         """Say whether a driver has a corner at a time."""
@@ -298,10 +306,7 @@ class Stepper:
         inputs = replace(self._inputs, t=np.array([begin.t]), p=begin.p)
         with np.errstate(all="ignore"):
             equations = problem(self._code, begin.p, begin.q, begin.t)
-            if self._code.lanes is None:
-                return lead(inputs, equations, begin.q, p)[0]
-            found, reached, _ = lead_together(inputs, equations, begin.q, p[np.newaxis])
-        return np.ascontiguousarray(found[:, 0]) if reached[0] else None
+            return lead(inputs, equations, begin.q, p)[0]
 
     def _set_out(self, begin: Instant) -> None:
         """Let the march go on from a point of the motion, unless that is nearly singular."""
@@ -356,8 +361,7 @@ def stepper(
             f"a {type(given).__name__} is a function already: call it, f(u), or f.at(u, near=pose) "
             "to go on from a pose."
         )
-    inputs = _read(module, 0.0, p, guess, through)
-    return Stepper(inputs, guess, through)
+    return Stepper(_read(module, 0.0, p, guess, through))
 
 
 def _reach(t: float) -> float:
@@ -374,4 +378,12 @@ def _read(
 
 def _is_like(p: Array, measured: Array) -> bool:
     """Say whether parameters are so near others that numbers are judged alike."""
-    return bool((np.abs(p - measured) <= np.abs(measured)).all())
+    pairs = zip(p.tolist(), measured.tolist(), strict=True)
+    return all(abs(x - y) <= abs(y) and abs(x - y) <= abs(x) for x, y in pairs)
+
+
+def _is_plain(value: object) -> bool:
+    """Say whether a value is a finite number that needs no further look."""
+    if type(value) is int:
+        return value.bit_length() < EXACT
+    return isinstance(value, float) and math.isfinite(value)

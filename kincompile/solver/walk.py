@@ -67,7 +67,8 @@ def walk(b: Point, s: Scales, at: State, t: Real, o: Outcome):
             take_up(at, b, 0)
         else:
             put_at(b, at, 0, 1)
-        is_stuck = not is_good and abs(h) <= smallest
+        # A time that is no number leaves no step.
+        is_stuck = not is_good and not abs(h) > smallest
         if is_stuck or (is_good and is_whole):
             break
         size = abs(h)

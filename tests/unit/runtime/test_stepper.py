@@ -5,6 +5,9 @@ import pytest
 
 import kincompile as kc
 from kincompile.errors import InputError, StructuralError
+from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.native.stepper import _zeros
+from kincompile.runtime.problem import problem
 
 from .test_corners import TIMES, press
 from .test_variants import parallelogram
@@ -35,13 +38,15 @@ def compare(now, solution, k=-1, tolerance=1e-12):
         np.testing.assert_allclose(here, there, rtol=0, atol=tolerance * size)
 
 
-def rocked(name="rocked"):
+GUESSES = ((0, 0, 1), (1, 1.7, 0.1), (3, 0, 2))
+
+
+def rocked(name="rocked", guesses=GUESSES):
     """Return a four-bar whose crank is led to and fro, into a lock-up at sin t = 0.9217."""
     m = kc.Mechanism(name)
     a, b, c, d = (m.parameter(x, value, "m") for x, value in zip("abcd", (2, 2, 2, 3), strict=True))
-    crank = m.body("crank", guess=(0, 0, 1))
-    coupler = m.body("coupler", guess=(1, 1.7, 0.1))
-    rocker = m.body("rocker", guess=(3, 0, 2))
+    names = ("crank", "coupler", "rocker")
+    crank, coupler, rocker = (m.body(x, guess=y) for x, y in zip(names, guesses, strict=True))
     m.add(kc.Revolute("A", m.ground, (0, 0), crank, (0, 0)))
     m.add(kc.Revolute("B", crank, (a, 0), coupler, (0, 0)))
     m.add(kc.Revolute("C", coupler, (b, 0), rocker, (c, 0)))
@@ -236,9 +241,48 @@ def test_that_a_jump_has_no_way(edited):
     assert step(1.5)["phi_rod"] == pytest.approx(1 + start["phi_rod"])
 
 
+@pytest.mark.parametrize("target", TARGETS)
+def test_that_a_reset_assembles_from_another_guess(target):
+    module = compile_for(rocked(), target)
+    step, crossed = kc.stepper(module), kc.assemblies(module, 0.3)
+    first = step(0.3)
+    for guess in (dict(zip(module.COORDINATES, crossed[0], strict=True)), *crossed):
+        step.reset(guess)
+        compare(step(0.3), kc.solve(module, 0.3, guess=guess))
+    step.reset()
+    np.testing.assert_allclose(step(0.3).q, first.q, atol=1e-12)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_that_a_prediction_without_numbers_has_no_position(target):
+    """As that of a time of 1e300 s, which functions of a module in grouped form refuse."""
+    module = compile_for(rocked(), target)
+    equations = problem(code_of(module), module.DEFAULTS, module.GUESS, 0.0, sparse=True)
+    for number in (np.inf, np.nan):
+        assert equations.at(np.full(module.N_COORDINATES, number), 0.0) is None
+
+
 def test_that_a_gap_without_positions_is_not_jumped(example_3_7_5):
     step = kc.stepper(example_3_7_5, {"l": 0.5})
     assert [step(t).status for t in (0, 1, 12, 1, 13)] == [0, 0, kc.Status.LOCK_UP, 0, 7]
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_that_a_first_position_beside_a_lock_up_is_gone_on_from(target):
+    """It is too near to singular to step from, but it is where the motion stands."""
+    module = compile_for(rocked(), target)
+    step, beyond = kc.stepper(module), 2 * np.pi - 1.9 - LOCK_UP  # where there are positions again
+    assert kc.solve(module, beyond).success
+    assert step(LOCK_UP - 5e-12).success
+    assert step(beyond).status is kc.Status.LOCK_UP
+
+
+def test_that_the_first_call_says_where_a_guess_chooses_no_assembly():
+    module = kc.compile(rocked(guesses=[(0, 0, 0)] * 3))
+    with pytest.warns(kc.AssemblyWarning, match="there is no guess of") as caught:
+        now = kc.stepper(module)(0.0)
+    assert [x.filename for x in caught] == [__file__]
+    assert now.success
 
 
 def test_a_first_call_that_finds_no_position():
@@ -292,6 +336,7 @@ def test_that_large_changes_stay_on_the_branch(target):
 @pytest.mark.parametrize("target", TARGETS)
 def test_that_parameters_may_not_lead_over_the_end_of_a_branch(target):
     step = kc.stepper(compile_for(rocked(), target))
+    step(0.2)
     here = step(0.5)
     now = step(0.5, a=0.3, b=0.3, c=0.3)
     assert now.status is kc.Status.NOT_CONVERGED
@@ -305,6 +350,27 @@ def test_that_parameters_may_not_lead_over_the_end_of_a_branch(target):
     np.testing.assert_allclose(step(0.5).q, here.q, atol=1e-12)
 
 
+@pytest.mark.parametrize("factor", [1.01, 1 / 1.01])
+def test_that_lengths_are_judged_by_the_size_that_they_have(factor, monkeypatch):
+    """Small steps lead far, and what is a jump is small beside the first size at last."""
+    sizes = []
+
+    def noted(*given):
+        found = problem(*given)
+        sizes.append(found.size)
+        return found
+
+    step = kc.stepper(kc.compile(rocked()))
+    monkeypatch.setattr("kincompile.runtime.stepper.problem", noted)
+    step(0.3)
+    (first,) = sizes
+    for scale in factor ** np.arange(700):
+        now = step(0.3, a=2 * scale, b=2 * scale, c=2 * scale, d=3 * scale)
+        assert now.success
+        assert 0.4 < sizes[-1] / (first * scale) < 2.5
+    assert sizes[-1] / first == pytest.approx(factor**699, rel=1.5)
+
+
 def test_that_no_array_of_a_caller_is_kept():
     module = kc.compile(rocked(), "c")
     step, p = kc.stepper(module), module.DEFAULTS.copy()
@@ -312,8 +378,10 @@ def test_that_no_array_of_a_caller_is_kept():
     q = first.q
     p[:] = 7
     assert (first.p == module.DEFAULTS).all()
-    with pytest.raises(ValueError, match="read-only"):
-        first.q[:] = 0
+    own = kc.stepper(module, {"a": 2.1})
+    for kept in (first.q, first.p, own(0.2).p, own(0.2, b=2.1).p):
+        with pytest.raises(ValueError, match="read-only"):
+            kept[:] = 0
     np.testing.assert_allclose(step(0.2).q, q, atol=1e-12)
 
 
@@ -329,6 +397,14 @@ def test_that_two_of_one_module_do_not_disturb_each_other(example_named, target)
     for k, time in enumerate(t):
         compare(one(time), first, k)
         compare(other(5 - time), second, k)
+
+
+def test_that_numbers_of_a_step_in_c_begin_with_a_line_of_the_cache():
+    """Else a step of an RSSR linkage takes half as long again."""
+    for count in (1, 9, 1000, 100_000):
+        found = _zeros(count)
+        assert (found.size, found.ctypes.data % 64) == (count, 0)
+        assert not found.any()
 
 
 def test_that_columns_have_names(example_named):
@@ -364,6 +440,9 @@ def test_that_outputs_are_not_finite_where_they_have_no_value():
         (lambda step: step(0.5, a="long"), "parameter 'a' is str: give real numbers"),
         (lambda step: step(0.5, a=[1, 2]), r"parameter 'a' has shape \(2,\): give one number"),
         (lambda step: step(0.5, a=np.inf), "parameter 'a' is inf: give a finite number"),
+        (lambda step: step(0.5, a=10**400), "parameter 'a' is int: give real numbers"),
+        (lambda step: step(0.5, a=True), "parameter 'a' is bool: give real numbers"),
+        (lambda step: step(0.5, np.array([2, 2, 2, "3"], object)), "is an array of object: give r"),
         (lambda step: step(0.5, [1.0]), r"the parameter vector has shape \(1,\), expected \(4,\)"),
         (lambda step: step(0.5, np.full(4, np.nan)), "parameter 'a' is nan"),
         (lambda step: step(0.5, {"a": 1}, b=2), "p is given, and b by name"),
