@@ -222,10 +222,11 @@ class Fit(Shown):
     def size(self) -> float:
         """The diagonal of the box that all origins and points move in, over the motion [length]."""
         names = (*self.motion.coordinates, *self.motion.observed.names)
-        spans = [
-            max((np.ptp(self.motion[name]) for name in names if name.startswith(axis)), default=0.0)
+        axes = (
+            [self.motion[name] for name in names if name.startswith(axis)]
             for axis in ("x_", "y_", "z_")
-        ]
+        )
+        spans = [np.ptp(np.concatenate(places)) for places in axes if places]
         return float(np.linalg.norm(spans))
 
     @property

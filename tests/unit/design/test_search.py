@@ -294,10 +294,9 @@ def test_other_designs_and_their_front():
     every = (found, *found.others)
     assert len(every) > 1
     assert [item.error for item in every] == sorted(item.error for item in every)
-    x, y = (
-        max(np.ptp(found.motion[f"{c}_{k}"]) for k in ("crank", "rod", "rocker", "P")) for c in "xy"
-    )
-    assert found.size == pytest.approx(math.hypot(x, y))
+    names = ("crank", "rod", "rocker", "P")
+    x, y = ([found.motion[f"{axis}_{name}"] for name in names] for axis in "xy")
+    assert found.size == pytest.approx(math.hypot(np.ptp(x), np.ptp(y)))
     front = set(map(id, found.front))
     assert id(found) in front
     for item in every:
