@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
+from importlib import import_module
 from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -34,11 +35,17 @@ class BodyKind:
     written_in: str
     # What to take in place of constraint types of the other kinds of bodies, by their names.
     elsewhere: Mapping[str, str]
+    # Module and name of this constant, which a copy in another process is again.
+    home: tuple[str, str]
     # The module that makes a load of a body's mass; loaded where a body has one.
     masses: str = "kincompile.model.masses"
     # Names of the types that drive all turning of a body, and one turn of it; of a ball joint, and
     # of the joint that holds the spin which two ball joints leave.
     turning: tuple[str, str, str, str] = ("", "", "", "")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Kinds are compared by identity: a pickle names the constant."""
+        return _constant, self.home
 
     @property
     def ground(self) -> tuple[int, ...]:
@@ -56,6 +63,11 @@ class BodyKind:
         return self.frame.letters
 
 
+def _constant(module: str, name: str) -> Any:
+    """Return a constant of a module."""
+    return getattr(import_module(module), name)
+
+
 PLANAR = BodyKind(
     frame=PlaneFrame,
     units=(None, None, "rad"),
@@ -70,6 +82,7 @@ PLANAR = BodyKind(
         "PointOnLine": "RevoluteTranslational",
         "FollowerTorque": "Torque",
     },
+    home=(__name__, "PLANAR"),
 )
 
 

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -321,3 +321,11 @@ def test_other_designs_and_their_front():
 def test_options_that_cannot_be_used(options, words):
     with pytest.raises(kc.InputError, match=words):
         straight(**options)
+
+
+@pytest.mark.slow
+def test_that_parts_are_searched_in_processes():
+    here = straight(samples=4096 + 64)
+    with ProcessPoolExecutor(2) as pool:
+        there = straight(samples=4096 + 64, executor=pool)
+    assert here.parameters == there.parameters

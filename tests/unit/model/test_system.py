@@ -1,5 +1,6 @@
 """From what is written to a checked system: order, names, units, guesses, and its matrices."""
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -207,3 +208,12 @@ def test_that_an_axis_need_not_have_length_one() -> None:
         return m.Phi[0]
 
     assert sympy.simplify(row((3, 4)) - row((6, 8))) == 0
+
+
+@pytest.mark.parametrize("name", ["four_bar", "rssr"])
+def test_that_a_pickled_mechanism_is_the_same_model(name, example_named):
+    """So that a process of an executor can compile it."""
+    model = example_named(name).model
+    copy = pickle.loads(pickle.dumps(model))
+    assert copy.to_toml() == model.to_toml()
+    assert kc.compile(copy).FINGERPRINT == kc.compile(model).FINGERPRINT
