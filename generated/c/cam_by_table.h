@@ -84,7 +84,10 @@ typedef struct {
 
 void cam_by_table_solve(const cam_by_table_system *system);
 
-// What became of a point in time.
+// What became of a point in time. The first five are also those of a transmission, whose header may
+// come before this one.
+#ifndef CAM_BY_TABLE_STATUSES
+#define CAM_BY_TABLE_STATUSES
 enum {
     CAM_BY_TABLE_CONVERGED = 0,      // position, velocity and acceleration were found
     CAM_BY_TABLE_NOT_CONVERGED = 1,  // no position was found, or none that continues the motion
@@ -92,8 +95,11 @@ enum {
                                    // so nearly that the rates found do not meet their equations
     CAM_BY_TABLE_NOT_FINITE = 3,     // an equation or a derivative is not a finite number
     CAM_BY_TABLE_NOT_REACHED = 4,    // not tried, because an earlier point failed
-    CAM_BY_TABLE_LOCK_UP = 7,        // the drivers demand what the joints cannot give: velocities grow
-                                   // without bound before this time
+};
+#endif
+enum {
+    CAM_BY_TABLE_LOCK_UP = 7,  // the drivers demand what the joints cannot give: velocities grow
+                             // without bound before this time
 };
 
 // A guess of the position at a time. It may be rough: safeguarded steps, restarts and angles turned

@@ -86,7 +86,10 @@ typedef struct {
 
 void four_bar_solve(const four_bar_system *system);
 
-// What became of a point in time.
+// What became of a point in time. The first five are also those of a transmission, whose header may
+// come before this one.
+#ifndef FOUR_BAR_STATUSES
+#define FOUR_BAR_STATUSES
 enum {
     FOUR_BAR_CONVERGED = 0,      // position, velocity and acceleration were found
     FOUR_BAR_NOT_CONVERGED = 1,  // no position was found, or none that continues the motion
@@ -94,8 +97,11 @@ enum {
                                    // so nearly that the rates found do not meet their equations
     FOUR_BAR_NOT_FINITE = 3,     // an equation or a derivative is not a finite number
     FOUR_BAR_NOT_REACHED = 4,    // not tried, because an earlier point failed
-    FOUR_BAR_LOCK_UP = 7,        // the drivers demand what the joints cannot give: velocities grow
-                                   // without bound before this time
+};
+#endif
+enum {
+    FOUR_BAR_LOCK_UP = 7,  // the drivers demand what the joints cannot give: velocities grow
+                             // without bound before this time
 };
 
 // A guess of the position at a time. It may be rough: safeguarded steps, restarts and angles turned

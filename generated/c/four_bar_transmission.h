@@ -18,6 +18,8 @@ extern "C" {
 // What became of a call: a position was found; none near the guess, or the prediction; it is
 // singular, or such a position lies between the last one and the inputs; a number is not finite;
 // the way is too long. Only the first has numbers: x and J are NaN otherwise.
+#ifndef FOUR_BAR_STATUSES
+#define FOUR_BAR_STATUSES
 enum {
     FOUR_BAR_CONVERGED = 0,
     FOUR_BAR_NOT_CONVERGED = 1,
@@ -25,6 +27,7 @@ enum {
     FOUR_BAR_NOT_FINITE = 3,
     FOUR_BAR_NOT_REACHED = 4,
 };
+#endif
 
 // A position of a mechanism, from which it goes on, and how it came there.
 typedef struct {

@@ -78,7 +78,10 @@ typedef struct {
 
 void problem_3_5_6_solve(const problem_3_5_6_system *system);
 
-// What became of a point in time.
+// What became of a point in time. The first five are also those of a transmission, whose header may
+// come before this one.
+#ifndef PROBLEM_3_5_6_STATUSES
+#define PROBLEM_3_5_6_STATUSES
 enum {
     PROBLEM_3_5_6_CONVERGED = 0,      // position, velocity and acceleration were found
     PROBLEM_3_5_6_NOT_CONVERGED = 1,  // no position was found, or none that continues the motion
@@ -86,8 +89,11 @@ enum {
                                    // so nearly that the rates found do not meet their equations
     PROBLEM_3_5_6_NOT_FINITE = 3,     // an equation or a derivative is not a finite number
     PROBLEM_3_5_6_NOT_REACHED = 4,    // not tried, because an earlier point failed
-    PROBLEM_3_5_6_LOCK_UP = 7,        // the drivers demand what the joints cannot give: velocities grow
-                                   // without bound before this time
+};
+#endif
+enum {
+    PROBLEM_3_5_6_LOCK_UP = 7,  // the drivers demand what the joints cannot give: velocities grow
+                             // without bound before this time
 };
 
 // A guess of the position at a time. It may be rough: safeguarded steps, restarts and angles turned

@@ -84,7 +84,10 @@ typedef struct {
 
 void slider_crank_solve(const slider_crank_system *system);
 
-// What became of a point in time.
+// What became of a point in time. The first five are also those of a transmission, whose header may
+// come before this one.
+#ifndef SLIDER_CRANK_STATUSES
+#define SLIDER_CRANK_STATUSES
 enum {
     SLIDER_CRANK_CONVERGED = 0,      // position, velocity and acceleration were found
     SLIDER_CRANK_NOT_CONVERGED = 1,  // no position was found, or none that continues the motion
@@ -92,8 +95,11 @@ enum {
                                    // so nearly that the rates found do not meet their equations
     SLIDER_CRANK_NOT_FINITE = 3,     // an equation or a derivative is not a finite number
     SLIDER_CRANK_NOT_REACHED = 4,    // not tried, because an earlier point failed
-    SLIDER_CRANK_LOCK_UP = 7,        // the drivers demand what the joints cannot give: velocities grow
-                                   // without bound before this time
+};
+#endif
+enum {
+    SLIDER_CRANK_LOCK_UP = 7,  // the drivers demand what the joints cannot give: velocities grow
+                             // without bound before this time
 };
 
 // A guess of the position at a time. It may be rough: safeguarded steps, restarts and angles turned

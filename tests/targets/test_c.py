@@ -10,6 +10,7 @@ import sympy
 
 import kincompile as kc
 from kincompile.runtime.status import Status
+from tests import transmission_models as models
 
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror")
 x, y = sympy.symbols("x y")
@@ -53,6 +54,38 @@ def test_a_header_can_be_included_alone_and_twice(example, quick_compiler, tmp_p
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert source.removesuffix(".c") == header.removesuffix(".h")
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["mechanism", "transmission"])
+def test_a_mechanism_and_its_transmission_go_into_one_program(order, tmp_path, quick_compiler):
+    """Whichever header comes first; in C and in C++."""
+    model, ends = models.crank_rocker(), (["motor"], ["rocker.phi"])
+    for emitted in (kc.emit(model, "c"), kc.emit(model, "c", transmission=ends)):
+        emitted.write(tmp_path)
+    name = model.name
+    headers = [f"{name}.h", f"{name}_transmission.h"]
+    lines = [f'#include "{headers[k]}"' for k in order]
+    body = (
+        f"static {name}_state s;\nint main(void)\n{{\n    double x[1], u[1] = {{1.6}};\n"
+        f"    int all = {name.upper()}_CONVERGED + {name.upper()}_NOT_REACHED"
+        f" + {name.upper()}_LOCK_UP;\n    return all == 11 && {name}_defaults[0] > 0 && "
+        f"{name}_start(&s) == {name.upper()}_CONVERGED && "
+        f"{name}_transmission(&s, u, x, NULL) == {name.upper()}_CONVERGED ? 0 : 1;\n}}\n"
+    )
+    text = "\n".join((*lines, "#include <stddef.h>", body))
+    (tmp_path / "user.c").write_text(text)
+    (tmp_path / "user.cpp").write_text(text)
+    objects = [f"{name}.o", f"{name}_transmission.o"]
+    commands = [
+        (quick_compiler, *STRICT, "-c", f"{name}.c", f"{name}_transmission.c"),
+        (quick_compiler, *STRICT, "user.c", *objects, "-lm", "-o", "in_c"),
+        ("g++", "-Wall", "-Wextra", "-Werror", "user.cpp", *objects, "-lm", "-o", "in_cpp"),
+        ("./in_c",),
+        ("./in_cpp",),
+    ]
+    for command in commands:
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, ""), command
 
 
 def test_nothing_but_libm_is_used_and_nothing_from_the_heap(example):
