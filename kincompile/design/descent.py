@@ -50,6 +50,9 @@ KEPT = {8: 4.0, 20: 2.0, 40: 1.0, 80: 0.25}
 """After how many steps the best are kept, in parts of the starts that are followed. Others are left
 out, and in the end stay where they are."""
 
+MOST_POINTS = 2**16
+"""Points of a batch: of a four-bar with ten parameters some hundred megabytes."""
+
 FEWEST = 8
 """Starts that are kept, at least."""
 
@@ -182,8 +185,12 @@ class Descent:
         return found
 
     def run(self, x: Array, q: Array, starts: int, is_over: Callable[[int], bool]) -> Designs:
-        """Follow motions (B, nx) that are near positions (B, N, n) to the ends of the best."""
-        batch = self.solved(x, q)
+        """Follow motions (B, nx), the best first, from positions (B, N, n) to the ends of the best.
+
+        Of those with many times there are fewer, so that memory is bounded.
+        """
+        few = slice(max(FEWEST, MOST_POINTS // q.shape[1]))
+        batch = self.solved(x[few], q[few])
         batch = batch.some(batch.good)
         if not len(batch.x):
             return Designs.none()

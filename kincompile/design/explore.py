@@ -126,7 +126,7 @@ def _part(
     search = Search(bench, variables, plan.guesses)
     count = min(PART, plan.samples - number * PART) if plan.search == "sobol" else plan.samples
     (search.spread if plan.search == "sobol" else search.breed)(count, (plan.seed, number))
-    starts = search.starts()
+    starts = search.found
     every = np.concatenate((plan.bounds, np.reshape(bench.demands.time_bounds(), (-1, 2))))
     descent, budget, is_cut = Descent(bench, Variables(every)), plan.budget, False
 

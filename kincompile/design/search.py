@@ -52,6 +52,9 @@ STEPS = 72
 MOST_AT_ONCE = 2048
 """Sets that are taken through time together."""
 
+FEWEST, MOST_POINTS = 64, 2**18
+"""Sets at once at least, and points of their motions, so that memory is bounded."""
+
 MOST_KEPT = 512
 """Starts that are kept, the best ones."""
 
@@ -71,7 +74,7 @@ class Search:
     tried: int = 0
     moved: int = 0
     farthest: float = -np.inf  # the latest time that a set has reached
-    found: list[Designs] = field(default_factory=list)
+    found: Designs = field(default_factory=Designs.none)  # the best ones first
     _times: Array = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
@@ -114,8 +117,9 @@ class Search:
         """Return the least error of each set over its assemblies, infinite where it has none."""
         values = self.variables.to_x(parts)
         found = np.full(len(values), np.inf)
-        for first in range(0, len(values), MOST_AT_ONCE):
-            some = values[first : first + MOST_AT_ONCE]
+        count = min(MOST_AT_ONCE, max(FEWEST, MOST_POINTS // self._times.size))
+        for first in range(0, len(values), count):
+            some = values[first : first + count]
             for guess in self.guesses:
                 own = self._scored(some, guess)
                 found[first : first + len(some)] = np.minimum(found[first : first + len(some)], own)
@@ -148,7 +152,8 @@ class Search:
         )
         x = np.concatenate([values[alive], *self._variables(instants)], axis=1)
         q = np.take_along_axis(motion[0][own], places[own][..., np.newaxis], axis=1)
-        self.found.append(Designs(error[own], x[own], self._times[places[own]], q))
+        some = Designs(error[own], x[own], self._times[places[own]], q)
+        self.found = Designs.best([self.found, some], MOST_KEPT)
         return errors
 
     def _instants(
@@ -180,10 +185,6 @@ class Search:
             if target.times is None
         ]
         return [np.concatenate((t[:, :1], np.diff(t, axis=1)), axis=1) for t in own]
-
-    def starts(self) -> Designs:
-        """Return the best of what was found, the best first."""
-        return Designs.best(self.found or [Designs.none()], MOST_KEPT)
 
     def _through(self, sets: Array, guess: Array) -> tuple[NDArray[np.intp], tuple[Array, ...]]:
         """Return which sets get through all times, and q, q_dot, q_ddot, each (B, N, n)."""

@@ -69,7 +69,7 @@ def some(model, targets, bounds, count=64):
     variables = Variables(np.array(list(bounds.values())))
     search = Search(bench, variables, kc.assemblies(module, 0.0))
     search.spread(count, (0, 0))
-    starts = search.starts()
+    starts = search.found
     descent = Descent(bench, variables)
     batch = descent.solved(starts.x, starts.q)
     return descent, batch.some(batch.good)
