@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
-from importlib import import_module
 from itertools import accumulate, pairwise
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 import sympy
@@ -35,8 +35,8 @@ class BodyKind:
     written_in: str
     # What to take in place of constraint types of the other kinds of bodies, by their names.
     elsewhere: Mapping[str, str]
-    # Module and name of this constant, which a copy in another process is again.
-    home: tuple[str, str]
+    # Where this constant is, which a copy in another process is again.
+    home: str
     # The module that makes a load of a body's mass; loaded where a body has one.
     masses: str = "kincompile.model.masses"
     # Names of the types that drive all turning of a body, and one turn of it; of a ball joint, and
@@ -45,7 +45,7 @@ class BodyKind:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Kinds are compared by identity: a pickle names the constant."""
-        return _constant, self.home
+        return resolve_name, (self.home,)
 
     @property
     def ground(self) -> tuple[int, ...]:
@@ -63,11 +63,6 @@ class BodyKind:
         return self.frame.letters
 
 
-def _constant(module: str, name: str) -> Any:
-    """Return a constant of a module."""
-    return getattr(import_module(module), name)
-
-
 PLANAR = BodyKind(
     frame=PlaneFrame,
     units=(None, None, "rad"),
@@ -82,7 +77,7 @@ PLANAR = BodyKind(
         "PointOnLine": "RevoluteTranslational",
         "FollowerTorque": "Torque",
     },
-    home=(__name__, "PLANAR"),
+    home=f"{__name__}:PLANAR",
 )
 
 

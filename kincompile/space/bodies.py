@@ -50,7 +50,7 @@ SPATIAL = BodyKind(
         "RackAndPinion": "an Equation between a spatial.JointAngle and a way",
     },
     masses="kincompile.space.masses",
-    home=(__name__, "SPATIAL"),
+    home=f"{__name__}:SPATIAL",
 )
 
 
