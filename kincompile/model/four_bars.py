@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import sympy
 
@@ -12,11 +12,9 @@ from kincompile.model.resolve import Joint
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from kincompile.model.bodies import Body
-    from kincompile.model.scope import Point
     from kincompile.model.system import ConstraintSystem
 
-    Pin = tuple[str, Mapping[Body, Point]]
+    Pin = tuple[str, Mapping[str, tuple[Any, ...]]]
 
 
 class FourBarLoop(NamedTuple):
@@ -31,7 +29,7 @@ class FourBarLoop(NamedTuple):
 
 def four_bar_loops(system: ConstraintSystem) -> tuple[FourBarLoop, ...]:
     """Return the four-bars of a mechanism; of the links on the ground a driven one is the crank."""
-    drivers, ground, of = _turned(system), system.ground, _pins_of(system)
+    drivers, ground, of = _turned(system), system.ground.name, _pins_of(system)
     found = [
         _loop(pins, links, drivers)
         for first in of.get(ground, ())
@@ -57,24 +55,21 @@ def four_bars_at(system: ConstraintSystem, p: Iterable[float]) -> list[tuple[obj
     ]  # fmt: skip
 
 
-def _loop(
-    pins: tuple[Pin, ...], links: tuple[Body, ...], drivers: Mapping[str, str]
-) -> FourBarLoop:
+def _loop(pins: tuple[Pin, ...], links: tuple[str, ...], drivers: Mapping[str, str]) -> FourBarLoop:
     """Return a four-bar with its lengths as expressions."""
     lengths = []
     for k, body in enumerate(links):
         (x, y), (u, v) = pins[k - 1][1][body], pins[k][1][body]
         square = (as_sympy(u) - as_sympy(x)) ** 2 + (as_sympy(v) - as_sympy(y)) ** 2
         lengths.append(sympy.sqrt(square))
-    names = tuple(body.name for body in links)
-    driven = next((name for name in (names[1], names[3], names[2]) if name in drivers), "")
+    driven = next((name for name in (links[1], links[3], links[2]) if name in drivers), "")
     joints = tuple(name for name, _ in pins)
-    return FourBarLoop(joints, names, tuple(lengths), drivers.get(driven, ""), driven)
+    return FourBarLoop(joints, links, tuple(lengths), drivers.get(driven, ""), driven)
 
 
 def _around(
-    of: Mapping[Body, Sequence[Pin]], pins: tuple[Pin, ...], links: tuple[Body, ...]
-) -> Iterator[tuple[tuple[Pin, ...], tuple[Body, ...]]]:
+    of: Mapping[str, Sequence[Pin]], pins: tuple[Pin, ...], links: tuple[str, ...]
+) -> Iterator[tuple[tuple[Pin, ...], tuple[str, ...]]]:
     """Yield four pins and four links, the last pin on the ground again, that begin with these."""
     if len(pins) == 4:
         yield pins, links
@@ -86,21 +81,22 @@ def _around(
                 yield from _around(of, (*pins, pin), (*links, body))
 
 
-def _pins_of(system: ConstraintSystem) -> dict[Body, list[Pin]]:
-    """Return the pins of each body: the name of a joint, and the place on each body on it."""
+def _pins_of(system: ConstraintSystem) -> dict[str, list[Pin]]:
+    """Return the pins of bodies by their names: of each a joint, and its place on every body."""
     found: list[Pin] = []
     for item in system.constraints:
         if not isinstance(item, Joint) or item.type_name != "Revolute":
             continue
         if set(item.points) != {"s_i", "s_j"} or len(item.points["s_i"]) != 2:
             continue  # in space
-        ends = dict(zip(item.bodies, (item.points["s_i"], item.points["s_j"]), strict=True))
+        points = (tuple(item.points[which]) for which in ("s_i", "s_j"))
+        ends = dict(zip((body.name for body in item.bodies), points, strict=True))
         same = [pin for pin in found if ends.items() & pin[1].items()]
         for pin in same:  # of three bodies on one pin
             found.remove(pin)
             ends = {**pin[1], **ends}
         found.append((same[0][0] if same else item.name, ends))
-    of: dict[Body, list[Pin]] = {}
+    of: dict[str, list[Pin]] = {}
     for pin in found:
         for body in pin[1]:
             of.setdefault(body, []).append(pin)
@@ -110,10 +106,11 @@ def _pins_of(system: ConstraintSystem) -> dict[Body, list[Pin]]:
 def _turned(system: ConstraintSystem) -> dict[str, str]:
     """Return the driver of each body that is turned against the ground."""
     return {
-        body.name: item.name
+        body: item.name
         for item in system.constraints
         if isinstance(item, Joint) and item.is_driver
         if any(x.symbol == "C" and x.unit == "rad" for x in item.written.arguments().values())
-        for body in set(item.bodies) - {system.ground}
-        if len(set(item.bodies) - {system.ground}) == 1
+        for moving in [{body.name for body in item.bodies} - {system.ground.name}]
+        if len(moving) == 1
+        for body in moving
     }

@@ -178,3 +178,9 @@ targets = [{ grashof = "crank-rocker", link = "rocker", margin = 0.5 }]
     rooms = [float(item.what.subs(values)) for item in limits]
     assert rooms == pytest.approx([2.0, 1.0, 1.0])
     assert limits[0].title == "crank-rocker of O A B C, with ground as l"
+
+
+def test_that_bodies_with_outlines_have_measures(example_named):
+    """Outlines are lists, so bodies go by their names."""
+    solution = kc.solve(example_named("wrecker_boom").module, [0.0, 1.0])
+    assert solution.measures().four_bars is not None
