@@ -81,9 +81,9 @@ def _joints(system: ConstraintSystem) -> dict[str, tuple[str, ...]]:
 
 def _four_bars(system: ConstraintSystem) -> Callable[..., Any]:
     """Return what gives the four-bars with parameters."""
-    from kincompile.model.four_bars import four_bars_at
+    from kincompile.model.four_bars import four_bar_loops, four_bars_at
 
-    return partial(four_bars_at, system)
+    return partial(four_bars_at, system, four_bar_loops(system))
 
 
 def _joint_points(system: ConstraintSystem) -> Compiled:

@@ -20,13 +20,12 @@ import numpy as np
 from kincompile.criteria import TOLERANCE
 from kincompile.design.designs import Designs
 from kincompile.design.placing import Placing, best_places
-from kincompile.design.rows import Motions
-from kincompile.design.trial import EAGERNESS
+from kincompile.design.rows import Columns, Motions
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.engine.linear import Planned
 from kincompile.runtime.march import March, all_hold
 from kincompile.runtime.problem import problem
-from kincompile.runtime.results.observed import Points, observed
+from kincompile.runtime.results.observed import Points
 from kincompile.runtime.results.sensitivities import slopes_of
 
 if TYPE_CHECKING:
@@ -59,6 +58,9 @@ FEWEST = 8
 SETTLED = 1e-13
 """Relative change of the error at which a start has come to its end."""
 
+MOST_DAMPED, REACHED = 1e12, 1e-28
+"""Damping at which a start has come to its end, and error that is as good as zero."""
+
 WITNESSES = 24
 """Motions from which it is seen which parameters are linear, and which move the whole."""
 
@@ -83,7 +85,13 @@ class Batch:
     q_dot: Array
     q_ddot: Array
     signs: Array  # (B, N, blocks): of the determinants
-    good: Mask  # (B,): where all points were found
+    # (B,): error, with what limits are exceeded by; infinite where not all points were found
+    cost: Array
+
+    @property
+    def good(self) -> Mask:
+        """Where all points were found."""
+        return np.isfinite(self.cost)
 
     def some(self, which: Any) -> Batch:
         """Return some of them."""
@@ -108,12 +116,11 @@ class Descent:
         """Solve motions (B, nx) from positions nearby (B, N, n), on the branch of signs."""
         code, t, sets = code_of(self.bench.module), self._times(x), self.bench.sets(x)
         count, steps, n = q.shape
-        lanes = np.ascontiguousarray(np.repeat(sets, steps, axis=0).T)
         flat = np.ascontiguousarray(q.reshape(-1, n).T)
         self.motions += count
         with np.errstate(all="ignore"):
             equations = problem(code, sets[0], q[0, 0], float(t[0, 0]))
-            march = March(equations, Planned(code, lanes), TOLERANCE)
+            march = March(equations, Planned(code, _lanes(sets, steps)), TOLERANCE)
             found = march.correct_together(flat, t.ravel(), CORRECTIONS)
             state, checks = march.complete(found.point)
         good = np.reshape(all_hold(found.good, checks), (count, steps))
@@ -122,7 +129,10 @@ class Descent:
             good = good & (now == signs).all(axis=2)
         states = state.point.q, state.q_dot, state.q_ddot
         q, q_dot, q_ddot = (part.T.reshape(count, steps, n) for part in states)
-        return Batch(x, t, q, q_dot, q_ddot, now, np.asarray(good.all(axis=1)))
+        batch = Batch(x, t, q, q_dot, q_ddot, now, np.where(good.all(axis=1), 0.0, np.inf))
+        if batch.good.any():
+            batch.cost[batch.good] = self.seen(batch.some(batch.good)).costs()
+        return batch
 
     def _times(self, x: Array) -> Array:
         """Return the times of motions, (B, N): those of the grid, then of each passing target."""
@@ -132,25 +142,14 @@ class Descent:
 
     def seen(self, batch: Batch, names: tuple[str, ...] = ()) -> Motions:
         """Return their columns, with derivatives by some parameters."""
-        code, demands, sets = (
-            code_of(self.bench.module),
-            self.bench.demands,
-            self.bench.sets(batch.x),
-        )
-        motion = batch.q, batch.q_dot, batch.q_ddot
-        outputs = observed(code, motion, batch.t, sets)
-
-        def column(name: str, order: int) -> Array:
-            if name in code.coordinates:
-                return motion[order][..., code.coordinates.index(name)]
-            return outputs.column(name, order).values
-
+        code, demands = code_of(self.bench.module), self.bench.demands
+        motion, sets = (batch.q, batch.q_dot, batch.q_ddot), self.bench.sets(batch.x)
         slope: Callable[[str, int], Array] | None = None
         if names:
             count, steps, n = batch.q.shape
             states = (np.ascontiguousarray(part.reshape(-1, n).T) for part in motion)
-            lanes = np.ascontiguousarray(np.repeat(sets, steps, axis=0).T)
-            found = slopes_of(code, names, demands.columns, Points(lanes, batch.t.ravel(), *states))
+            points = Points(_lanes(sets, steps), batch.t.ravel(), *states)
+            found = slopes_of(code, names, demands.columns, points)
             by = found.reshape(3, len(names), -1, count, steps)
             order_of = [x for x in (*code.coordinates, *code.outputs) if x in demands.columns]
 
@@ -163,26 +162,8 @@ class Descent:
             places.append(np.broadcast_to(own, (len(batch.x), own.size)))
             first += own.size
         grid = np.arange(demands.grid.size)
+        column = Columns(code, motion, batch.t, sets).column
         return Motions(demands, batch.t, grid, places, column, slope, is_fine=False)
-
-    def assess(self, batch: Batch, names: tuple[str, ...] = ()) -> tuple[Array, Array]:
-        """Return deviations, with those of limits, (B, R), and derivatives (B, R, nx)."""
-        seen = self.seen(batch, names)
-        (rows, by), (gaps, gaps_by) = seen.rows(), seen.gaps()
-        off = np.concatenate((rows, EAGERNESS * np.minimum(gaps, 0.0)), axis=1)
-        if by is None or gaps_by is None:
-            return off, np.empty((*off.shape, 0))
-        beyond = EAGERNESS * gaps_by * (gaps < 0)[..., np.newaxis]
-        return off, np.concatenate((by, beyond), axis=1)
-
-    def costs(self, batch: Batch) -> Array:
-        """Return the error of each, with what limits are exceeded by; infinite where not found."""
-        found = np.full(len(batch.x), np.inf)
-        if batch.good.any():
-            off, _ = self.assess(batch.some(batch.good))
-            cost = (off**2).sum(axis=1)
-            found[batch.good] = np.where(np.isfinite(cost), cost, np.inf)
-        return found
 
     def run(self, x: Array, q: Array, starts: int, is_over: Callable[[int], bool]) -> Designs:
         """Follow motions (B, nx), the best first, from positions (B, N, n) to the ends of the best.
@@ -196,19 +177,20 @@ class Descent:
             return Designs.none()
         ends, walk = [], _Walk(self, self.projected(self._placed(batch)))
         for step in range(ITERATIONS):
-            if step in KEPT and (most := max(FEWEST, int(KEPT[step] * starts))) < walk.cost.size:
-                rest = np.ones(walk.cost.size, dtype=bool)
-                rest[np.argsort(walk.cost, kind="stable")[:most]] = False
+            count, cost = len(walk.u), walk.batch.cost
+            if step in KEPT and (most := max(FEWEST, int(KEPT[step] * starts))) < count:
+                rest = np.ones(count, dtype=bool)
+                rest[np.argsort(cost, kind="stable")[:most]] = False
                 if KEPT[step] < 1:
                     ends.append(walk.ends(rest))
                 walk.drop(rest)
             if walk.is_done.any():
                 ends.append(walk.ends(walk.is_done))
                 walk.drop(walk.is_done)
-            if is_over(step) or not walk.cost.size:
+            if is_over(step) or not len(walk.u):
                 break
             walk.step()
-        ends.append(walk.ends(np.ones(walk.cost.size, dtype=bool)))
+        ends.append(walk.ends(slice(None)))
         return Designs.best(ends)
 
     def _placed(self, batch: Batch) -> Batch:
@@ -249,7 +231,7 @@ class Descent:
         inside = np.flatnonzero(self.variables.hold(x))
         if inside.size:
             found = self.solved(x[inside], q[inside], batch.signs[inside])
-            better = self.costs(found) < self.costs(batch.some(inside))
+            better = found.cost < batch.cost[inside]
             batch.put(inside[better], found.some(better))
         return batch
 
@@ -326,24 +308,30 @@ class _Walk:
     def __init__(self, descent: Descent, batch: Batch) -> None:
         self.descent, self.batch = descent, batch
         self.u = descent.variables.to_u(batch.x)
-        self.cost = descent.costs(batch)
         count, nx = batch.x.shape
-        self.off, self.by = descent.assess(batch, descent.bench.names)
+        self.off, self.by = self._sloped(batch)
         self.damping, self.growth = np.full(count, 1e-4), np.full(count, 2.0)
         self.scale = np.zeros((count, nx))
         self.is_done = ~np.isfinite(self.by).all(axis=(1, 2))
-        self.drop(self.is_done | ~np.isfinite(self.cost))
+        self.drop(self.is_done)
+
+    def _sloped(self, batch: Batch) -> tuple[Array, Array]:
+        """Return deviations and derivatives."""
+        off, by = self.descent.seen(batch, self.descent.bench.names).combined()
+        assert by is not None
+        return off, by
 
     def drop(self, which: Any) -> None:
         """Leave some out."""
         keep = ~which
         self.batch = self.batch.some(keep)
-        for name in ("u", "cost", "off", "by", "damping", "growth", "scale", "is_done"):
+        for name in ("u", "off", "by", "damping", "growth", "scale", "is_done"):
             setattr(self, name, getattr(self, name)[keep])
 
     def ends(self, which: Any) -> Designs:
         """Return where some are."""
-        return Designs(self.cost[which], *(getattr(self.batch, x)[which] for x in ("x", "t", "q")))
+        own = self.batch.some(which)
+        return Designs(own.cost, own.x, own.t, own.q)
 
     def step(self) -> None:
         """Take a step with each; one that is no better damps the next."""
@@ -364,26 +352,31 @@ class _Walk:
         moved = np.where(variables.is_turn, u, np.clip(u, 0.0, 1.0)) - self.u
         x = variables.to_x(variables.within(u))
         trial = descent.projected(descent.solved(x, self.batch.q, self.batch.signs))
-        cost = descent.costs(trial)
+        before, cost = self.batch.cost, trial.cost
         foreseen = -(2 * slope * moved).sum(axis=1) - np.einsum(
             "bi,bij,bj->b", moved, square, moved
         )
         with np.errstate(all="ignore"):
-            gain = np.where(foreseen > 0, (self.cost - cost) / foreseen, 0.0)
-        better = cost < self.cost
-        settled = better & (self.cost - cost <= SETTLED * self.cost)
-        self.is_done = settled | (self.damping > 1e12) | (self.cost < 1e-28)
+            gain = np.where(foreseen > 0, (before - cost) / foreseen, 0.0)
+        better = cost < before
+        settled = better & (before - cost <= SETTLED * before)
+        self.is_done = settled | (self.damping > MOST_DAMPED) | (before < REACHED)
         eased = np.maximum(1 / 3, 1 - (2 * np.clip(gain, 0.0, 1.0) - 1) ** 3)
         self.damping = self.damping * np.where(better, eased, self.growth)
         self.growth = np.where(better, 2.0, 2 * self.growth)
         own = np.flatnonzero(better)
         if own.size:
             self.batch.put(own, trial.some(own))
-            self.cost[own], self.u[own] = cost[own], variables.to_u(self.batch.x[own])
-            self.off[own], self.by[own] = descent.assess(self.batch.some(own), descent.bench.names)
+            self.u[own] = variables.to_u(self.batch.x[own])
+            self.off[own], self.by[own] = self._sloped(self.batch.some(own))
             lost = ~np.isfinite(self.by).all(axis=(1, 2))
             self.by[lost] = 0.0
             self.is_done |= lost
+
+
+def _lanes(sets: Array, steps: int) -> Array:
+    """Return parameters (B, k) of motions for each of their points, (k, B * steps)."""
+    return np.ascontiguousarray(np.repeat(sets, steps, axis=0).T)
 
 
 def _complex(

@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.compiler import compile as compile_model
-from kincompile.design.demands import read_demands
 from kincompile.design.descent import ITERATIONS, Descent
 from kincompile.design.designs import Designs
 from kincompile.design.search import Search
@@ -65,12 +63,6 @@ class Plan:
         """How many parts there are."""
         return -(-self.samples // PART) if self.search == "sobol" else 1
 
-    def workbench(self) -> Workbench:
-        """Return what evaluates trials, in this process."""
-        module = compile_model(self.model)
-        demands = read_demands(module, self.model.system(), self.targets)
-        return Workbench(module, demands, self.names, self.fixed)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explored:
@@ -120,7 +112,7 @@ def _part(
     steps: Callable[[int], None] | None = None,
 ) -> Explored:
     """Search one part; a worker makes its own workbench."""
-    bench = bench or plan.workbench()
+    bench = bench or Workbench.of(plan.model, plan.targets, plan.names, plan.fixed)
     begun = time.perf_counter() if begun is None else begun
     variables = Variables(plan.bounds)
     search = Search(bench, variables, plan.guesses)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import optimize
 
-from kincompile.design.trial import EAGERNESS, EXCESS
+from kincompile.design.rows import EAGERNESS
+from kincompile.design.trial import EXCESS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy
 
-from kincompile.compiler import compile as compile_model
-from kincompile.design.demands import limit_name, read_demands
+from kincompile.design.demands import limit_name
 from kincompile.design.deviation import MOST
 from kincompile.design.explore import Budget, Plan, explore
 from kincompile.design.finish import Norm, finished
@@ -135,10 +134,9 @@ def fit(
         norm=norm, **{name: most for name, most in budget.items() if most is not None},
     )  # fmt: skip
     extended = _with_limits(model, wanted)
-    module = compile_model(extended)
+    bench = Workbench.of(extended, wanted, names, fixed)
+    module, demands = bench.module, bench.demands
     _require_plan(module)
-    demands = read_demands(module, extended.system(), wanted)
-    bench = Workbench(module, demands, names, fixed)
     every = np.concatenate((limits, np.reshape(demands.time_bounds(), (-1, 2))))
     plan = Plan(
         extended, wanted, names, limits, fixed, _guesses(module, demands.first_time, p), samples,

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from kincompile.design.fitted import Fit
     from kincompile.design.tolerance_analysis import ToleranceAnalysis
+    from kincompile.model.mechanism import Mechanism
     from kincompile.runtime.results.solution import Solution
 
 WANTED: dict[str, Any] = {"colour": "var(--numeric)", "name": "wanted"}
@@ -101,27 +102,29 @@ def fit_page(found: Fit) -> str:
         rows = table(found.designs_titles(), found.designs())
         chapters.append(Chapter("designs", ("Designs",), (text(FRONT), rows)))
     name, model = found.model.name, found.model
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", KincompileWarning)  # the fit has said them
-        motion = solve(compile_model(model), np.linspace(0, model.end, model.points))
+    motion = _motion(model)
     plots = "\n".join((*_over_time(found, motion), *_paths(found, motion)))
     moving = f"<h2>{name}</h2>{framed_html(page(model, motion).html, name, HEIGHT)}"
     manuscript = Manuscript(name, found.message, tuple(chapters))
-    beside = _side_by_side(found) if found.others else ""
+    beside = _side_by_side(found, motion) if found.others else ""
     return as_html(manuscript, "Synthesis of", after=f"<p>{plots}</p>{beside}{moving}")
 
 
-def _side_by_side(found: Fit) -> str:
+def _motion(model: Mechanism) -> Solution:
+    """Return the motion of a model; the fit has said its warnings."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", KincompileWarning)
+        return solve(compile_model(model), np.linspace(0, model.end, model.points))
+
+
+def _side_by_side(found: Fit, first: Solution) -> str:
     """Return the designs as they move, in one scale, and the errors and sizes of all."""
     designs, shown = (found, *found.others), []
-    for number, item in enumerate(designs, 1):
-        module = compile_model(item.model)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", KincompileWarning)
-            motion = solve(module, np.linspace(0, item.model.end, item.model.points))
-        said = f"error {item.error:.4g}, size {item.size:.4g}"
-        guess = np.array(module.GUESS)
-        shown.append(Drawn(f"Design {number}", said, item.model.system(), motion, guess))
+    motions = [first, *(_motion(item.model) for item in found.others)]
+    for number, (item, motion) in enumerate(zip(designs, motions, strict=True), 1):
+        said, system = f"error {item.error:.4g}, size {item.size:.4g}", item.model.system()
+        guess = np.array([x.guess for x in system.coordinates])
+        shown.append(Drawn(f"Design {number}", said, system, motion, guess))
     name = f"Designs of {escape(found.model.name)}"
     layers = [
         Layer("dots", np.array([x.size for x in some]), np.array([x.error for x in some]), **how)

@@ -29,8 +29,6 @@ SAME = 1e-6
 STEPS = 8
 """Of Gauss and Newton, which turns and scales."""
 
-WAYS = ("along x", "along y", "turned", "scaled")
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placing:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.design.demands import Extremes, compared, deviation, sides, turning
+from kincompile.runtime.results.observed import observed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
     from kincompile.design.columns import Column
     from kincompile.design.demands import Demands, Side
+    from kincompile.runtime.engine.code import Compiled
 
     Array = NDArray[np.float64]
     Places = NDArray[np.intp]
@@ -26,6 +28,30 @@ if TYPE_CHECKING:
 
 SLACK = 1e-9
 """Part of all time that counts as none."""
+
+EAGERNESS = 10.0
+"""Factor of what limits are exceeded by, among the deviations."""
+
+
+class Columns:
+    """The columns of motions, (B, N), by name and order, evaluated once."""
+
+    def __init__(self, code: Compiled, motion: tuple[Array, ...], t: Array, sets: Array) -> None:
+        self._coordinates = code.coordinates
+        self._motion = motion
+        q, q_dot, q_ddot = motion
+        self._outputs = observed(code, (q, q_dot, q_ddot), t, sets)
+
+    @property
+    def count(self) -> int:
+        """The number of motions."""
+        return len(self._motion[0])
+
+    def column(self, name: str, order: int) -> Array:
+        """Return a coordinate or an output, or a rate of it."""
+        if name in self._coordinates:
+            return self._motion[order][..., self._coordinates.index(name)]
+        return self._outputs.column(name, order).values
 
 
 @dataclass(slots=True, eq=False)
@@ -49,6 +75,20 @@ class Motions:
     def gaps(self) -> tuple[Array, Array | None]:
         """Return what is left to limits, (B, G), negative beyond them, and derivatives."""
         return self._joined(self._left())
+
+    def combined(self) -> tuple[Array, Array | None]:
+        """Return deviations, then what limits are exceeded by, (B, R + G), and derivatives."""
+        (rows, by), (gaps, gaps_by) = self.rows(), self.gaps()
+        off = np.concatenate((rows, EAGERNESS * np.minimum(gaps, 0.0)), axis=1)
+        if by is None or gaps_by is None:
+            return off, None
+        beyond = EAGERNESS * gaps_by * (gaps < 0)[..., np.newaxis]
+        return off, np.concatenate((by, beyond), axis=1)
+
+    def costs(self) -> Array:
+        """Return the sum of squares of that, infinite where it is no number."""
+        cost = (self.combined()[0] ** 2).sum(axis=1)
+        return np.where(np.isfinite(cost), cost, np.inf)
 
     def _joined(self, parts: Iterator[Row]) -> tuple[Array, Array | None]:
         """Return parts side by side, by parameters and by variables that are times."""

@@ -19,15 +19,13 @@ from scipy.stats import qmc
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
 from kincompile.design.demands import deviation
 from kincompile.design.designs import Designs
-from kincompile.design.rows import Motions
-from kincompile.design.trial import EAGERNESS
+from kincompile.design.rows import Columns, Motions
 from kincompile.errors import KincompileWarning
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.engine.linear import Planned
 from kincompile.runtime.lanes import some_of
 from kincompile.runtime.march import March, all_hold
 from kincompile.runtime.problem import problem
-from kincompile.runtime.results.observed import observed
 from kincompile.runtime.solve import solve
 
 if TYPE_CHECKING:
@@ -39,7 +37,6 @@ if TYPE_CHECKING:
     from kincompile.design.targets import Passing
     from kincompile.design.trial import Workbench
     from kincompile.design.variables import Variables
-    from kincompile.runtime.engine.code import Compiled
 
     Array = NDArray[np.float64]
 
@@ -134,13 +131,12 @@ class Search:
         errors = np.full(len(values), np.inf)
         if not alive.size:
             return errors
-        seen = _Columns(code_of(self.bench.module), motion, self._times, sets[alive])
+        seen = Columns(code_of(self.bench.module), motion, self._times, sets[alive])
         instants = [self._instants(seen, *item) for item in self.bench.demands.passing]
         on_grid = np.searchsorted(self._times, self.bench.demands.grid)
         t = np.broadcast_to(self._times, (alive.size, self._times.size))
         rows = Motions(self.bench.demands, t, on_grid, instants, seen.column, is_fine=False)
-        over = EAGERNESS * np.minimum(rows.gaps()[0], 0.0)
-        error = (rows.rows()[0] ** 2).sum(axis=1) + (over**2).sum(axis=1)
+        error = rows.costs()
         is_whole = np.isfinite(error) & np.all(
             [np.diff(x).min(axis=1, initial=1) > 0 for x in instants], axis=0
         )
@@ -157,7 +153,7 @@ class Search:
         return errors
 
     def _instants(
-        self, seen: _Columns, target: Passing, columns: Sequence[Column]
+        self, seen: Columns, target: Passing, columns: Sequence[Column]
     ) -> NDArray[np.intp]:
         """Return which times a passing target is looked at, (B, K): those given, or the best."""
         if target.times is not None:
@@ -234,27 +230,6 @@ class Search:
         self.farthest = max(self.farthest, *reached.tolist()) if reached.size else self.farthest
         alive = np.flatnonzero(found.good.all(axis=1))
         return alive, tuple(part[alive] for part in (found.q, found.q_dot, found.q_ddot))
-
-
-class _Columns:
-    """The columns of motions, (B, N), by name and order, evaluated once."""
-
-    def __init__(self, code: Compiled, motion: tuple[Array, ...], t: Array, sets: Array) -> None:
-        self._coordinates = code.coordinates
-        self._motion = motion
-        q, q_dot, q_ddot = motion
-        self._outputs = observed(code, (q, q_dot, q_ddot), t, sets)
-
-    @property
-    def count(self) -> int:
-        """The number of motions."""
-        return len(self._motion[0])
-
-    def column(self, name: str, order: int) -> Array:
-        """Return a coordinate or an output, or a rate of it."""
-        if name in self._coordinates:
-            return self._motion[order][..., self._coordinates.index(name)]
-        return self._outputs.column(name, order).values
 
 
 def in_order(off: Array) -> tuple[Array, NDArray[np.intp]]:

@@ -8,14 +8,15 @@ redundant equations have none, and Newton's method starts near the position befo
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.compiler import compile as compile_model
 from kincompile.criteria import MAX_ITERATIONS, TOLERANCE
-from kincompile.design.demands import ORDERS
-from kincompile.design.rows import Motions
+from kincompile.design.demands import ORDERS, read_demands
+from kincompile.design.rows import EAGERNESS, Motions
 from kincompile.errors import KincompileWarning
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.follow import follow
@@ -25,18 +26,18 @@ from kincompile.runtime.solve import solution_of
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from types import ModuleType
 
     from numpy.typing import NDArray
 
     from kincompile.design.demands import Demands
+    from kincompile.design.targets import Target
+    from kincompile.model.mechanism import Mechanism
     from kincompile.runtime.results.sensitivities import Sensitivities
     from kincompile.runtime.results.solution import Solution
 
     Array = NDArray[np.float64]
-
-EAGERNESS = 10.0
-"""Factor of what limits are exceeded by, among the deviations."""
 
 EXCESS = 1e-7
 """Part of a limit by which it may be exceeded."""
@@ -85,7 +86,15 @@ class Workbench:
     # motions, gradients: how many of each were evaluated
     motions: int = 0
     gradients: int = 0
-    _found: Sensitivities | None = field(default=None, init=False)
+
+    @classmethod
+    def of(
+        cls, model: Mechanism, targets: Sequence[Target], names: tuple[str, ...],
+        fixed: dict[str, float],
+    ) -> Workbench:  # fmt: skip
+        """Return what evaluates trials of a model, whose limits are outputs of it."""
+        module = compile_model(model)
+        return cls(module, read_demands(module, model.system(), targets), names, fixed)
 
     def solved(self, x: Array, guess: Array | None, branch: Any = None) -> Trial | None:
         """Return the trial of some variables (nx,); None where the mechanism does not get through.

@@ -9,12 +9,11 @@ ID, SIS Login ID, Section, then a column an assignment, and a second line with t
 from __future__ import annotations
 
 import csv
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kincompile.errors import InputError
-from kincompile.exercises.graded import cell, reasons
+from kincompile.exercises.graded import cell, csv_text, reasons
 from kincompile.exercises.statistics import has_handed_in
 from kincompile.files.content import decoded, file_content
 from kincompile.names import listed
@@ -126,13 +125,13 @@ def gradebooks(
             [*_named(own, moodle), grades[x], cell(_feedback(students[x]))]
             for x, own in roster.items()
         ]
-        found["moodle.csv"] = _table(rows)
+        found["moodle.csv"] = csv_text(rows)
     if is_canvas:
         points = len(next(iter(students.values())))
         rows = [[*CANVAS, cell(title)]]
         rows.append(["    Points Possible", *[""] * (len(CANVAS) - 1), points])
         rows += [[*_named(_with_name(own), CANVAS), grades[x]] for x, own in roster.items()]
-        found["canvas.csv"] = _table(rows)
+        found["canvas.csv"] = csv_text(rows)
     return found
 
 
@@ -155,9 +154,3 @@ def _with_name(own: Mapping[str, str]) -> dict[str, str]:
     """Return a line of a roster with the name in one, as Canvas has it."""
     parts = _named(own, {name: MOODLE[name] for name in ("Last name", "First name")})
     return {"name": ", ".join(filter(None, parts)) or own[SHEET], **own}
-
-
-def _table(rows: Sequence[Sequence[object]]) -> str:
-    text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
+from io import StringIO
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from kincompile.exercises.blanks import Blank
 
@@ -56,6 +58,13 @@ def reasons(marks: Sequence[Mark], *, is_read: bool) -> str:
         if item.reason != RIGHT and item.is_read is is_read:
             blanks.setdefault(item.reason, []).append(item.blank.name)
     return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in blanks.items())
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as CSV."""
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
 def cell(text: str) -> str:

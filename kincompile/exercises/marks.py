@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kincompile.exercises.feedback import feedback
 from kincompile.exercises.gradebooks import gradebooks, read_roster
-from kincompile.exercises.graded import cell, reasons
+from kincompile.exercises.graded import cell, csv_text, reasons
 from kincompile.exercises.statistics import has_handed_in, statistics
 from kincompile.report.to_html import as_html
 from kincompile.writing import write_atomically, write_folder
@@ -47,17 +45,15 @@ class Marks:
         A blank that cannot be read has ``?``, and its reason stands in a column of its own.
         """
         blanks = next(iter(self.students.values()))
-        rows = StringIO()
-        table = csv.writer(rows, lineterminator="\n")
         names = [item.blank.name for item in blanks]
-        table.writerow(["student", "points", "of", *names, "reasons", "not read"])
+        rows: list[list[object]] = [["student", "points", "of", *names, "reasons", "not read"]]
         for student, marks in self.students.items():
             points = [item.points if item.is_read else "?" for item in marks]
-            table.writerow([
+            rows.append([
                 cell(student), sum(item.points for item in marks), len(marks), *points,
                 *(cell(reasons(marks, is_read=is_read)) for is_read in (True, False)),
             ])  # fmt: skip
-        return rows.getvalue()
+        return csv_text(rows)
 
     def statistics(self) -> Statistics:
         """Count outcomes and faults, by question: ``.to_text()``, ``.to_csv()``."""

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter
 from dataclasses import dataclass
-from io import StringIO
 from typing import TYPE_CHECKING
 
-from kincompile.exercises.graded import EMPTY, RIGHT, UNREAD, cell
+from kincompile.exercises.graded import EMPTY, RIGHT, UNREAD, cell, csv_text
 from kincompile.report import document as doc
 from kincompile.tables import indented, table
 
@@ -92,14 +90,12 @@ class Statistics:
 
     def to_csv(self) -> str:
         """Return a line for each question and each fault made in it."""
-        text = StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["question", "entry", "what", "times"])
+        rows: list[list[object]] = [["question", "entry", "what", "times"]]
         for name, asked in self.questions.items():
             own = [(item, self.outcomes[name, item]) for item in OUTCOMES]
             own += [(f"fault: {kind}", self.faults[kind, name]) for kind in self.kinds]
-            writer.writerows([name, cell(asked), what, times] for what, times in own)
-        return text.getvalue()
+            rows += [[name, cell(asked), what, times] for what, times in own]
+        return csv_text(rows)
 
     def page(self) -> doc.Manuscript:
         """Return both tables as a page."""

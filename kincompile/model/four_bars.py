@@ -42,8 +42,10 @@ def four_bar_loops(system: ConstraintSystem) -> tuple[FourBarLoop, ...]:
     return tuple(chosen.values())
 
 
-def four_bars_at(system: ConstraintSystem, p: Iterable[float]) -> list[tuple[object, ...]]:
-    """Return the four-bars of a mechanism with parameters p, as `FourBarType` takes them."""
+def four_bars_at(
+    system: ConstraintSystem, loops: Iterable[FourBarLoop], p: Iterable[float]
+) -> list[tuple[object, ...]]:
+    """Return four-bars of a mechanism with parameters p, as `FourBarType` takes them."""
     names = [item.name for item in system.parameters]
     values = {name: float(x) for name, x in zip(names, p, strict=True)}
     return [
@@ -51,7 +53,7 @@ def four_bars_at(system: ConstraintSystem, p: Iterable[float]) -> list[tuple[obj
             item.joints, item.links, tuple(evaluate(x, values) or 0.0 for x in item.lengths),
             system.length_unit, item.driver, item.driven,
         )
-        for item in four_bar_loops(system)
+        for item in loops
     ]  # fmt: skip
 
 

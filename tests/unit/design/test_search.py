@@ -84,7 +84,8 @@ CRANK_ROCKERS = {
 def test_that_motions_side_by_side_are_those_that_are_solved_alone():
     descent, batch = some(four_bar(), [timed(CLOSED)], CRANK_ROCKERS)
     names, module = descent.bench.names, descent.bench.module
-    _, by = descent.assess(batch, names)
+    _, by = descent.seen(batch, names).combined()
+    assert by is not None
     for k in (0, len(batch.x) // 2):
         p = dict(zip(names, batch.x[k].tolist(), strict=True))
         alone = kc.solve(module, batch.t[k], p, batch.q[k, 0])
