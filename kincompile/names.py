@@ -29,6 +29,12 @@ LARGEST_SEED = 2**32 - 1
 MOST_CHARACTERS = 100
 """Length of a name: files are called by it, and an operating system has a limit."""
 
+ROLES = ("double-crank", "crank-rocker", "double-rocker", "rocker-crank")
+"""Types of Grashof linkages, with ground, crank, coupler or rocker as the shortest link."""
+
+TRIPLE = "triple-rocker"
+"""The type of a four-bar of which no link turns wholly."""
+
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _UNIT = re.compile(r"(?!.*\*/)[\w°%·*/^.()+ -]*")
 

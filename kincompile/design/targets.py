@@ -27,8 +27,8 @@ from kincompile.errors import InputError
 from kincompile.model.expressions import number_in
 from kincompile.model.four_bars import four_bar_loops
 from kincompile.model.tasks import PART
-from kincompile.names import column_name, listed, shown, suggestion
-from kincompile.runtime.results.grashof import ROLES, TRIPLE, four_bar_with, non_grashof, room
+from kincompile.names import ROLES, TRIPLE, column_name, listed, shown, suggestion
+from kincompile.runtime.results.grashof import four_bar_with, non_grashof, room
 from kincompile.runtime.results.shapes import nearest_circle, nearest_level, nearest_line
 
 if TYPE_CHECKING:

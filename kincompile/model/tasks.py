@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile.model import declared as kind
 from kincompile.model.declared import declared, given
-from kincompile.names import LARGEST_SEED
+from kincompile.names import LARGEST_SEED, ROLES, TRIPLE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -271,9 +271,7 @@ class Grashof:
     """A four-bar is of a type, by Grashof's rule."""
 
     grashof: Any = given(
-        kind.one_of(
-            ("crank-rocker", "rocker-crank", "double-crank", "double-rocker", "triple-rocker")
-        ),
+        kind.one_of((*ROLES, TRIPLE)),
         "The type.",
     )
     link: str | None = given(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from kincompile.criteria import SAME
 from kincompile.errors import InputError
-from kincompile.names import listed
+from kincompile.names import ROLES, TRIPLE, listed
 from kincompile.runtime.engine.code import FOUR_BARS
 from kincompile.tables import table
 
@@ -23,11 +23,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T", bound="HasLinks")
 
-ROLES = ("double-crank", "crank-rocker", "double-rocker", "rocker-crank")
-"""Kinds of Grashof linkages, with ground, crank, coupler or rocker as the shortest link."""
-
-CHANGE, TRIPLE = "change point", "triple-rocker"
-"""Where s + l = p + q, and where no link turns wholly."""
+CHANGE = "change point"
+"""Where s + l = p + q."""
 
 
 class HasLinks(Protocol):

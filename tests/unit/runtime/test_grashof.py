@@ -9,7 +9,8 @@ import pytest
 
 import kincompile as kc
 from kincompile.design.task_tables import read_fit
-from kincompile.runtime.results.grashof import ROLES, margin_of, non_grashof
+from kincompile.names import ROLES
+from kincompile.runtime.results.grashof import margin_of, non_grashof
 
 TYPES = {
     "crank-rocker": (4, 1, 3, 3.5), "rocker-crank": (4, 3, 3.5, 1), "double-crank": (1, 3, 3.5, 3),
