@@ -54,7 +54,7 @@ $(DEMO_READY): $(VENV_READY) pyproject.toml .ci/constraints.txt
 
 $(TEST_READY): $(DEMO_READY)
 	@echo "Installing the test tools into $(VENV)"
-	@$(PIP) --editable '.[test,plot,sweep,dxf,watch,stiff,jax]'
+	@$(PIP) --editable '.[test,plot,sweep,dxf,watch,stiff,jax,robots]'
 	@touch $@
 
 $(PAGES_READY): $(TEST_READY)

@@ -3,29 +3,38 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import InputError
 from kincompile.files.adm_file import read_acf, read_adm
 from kincompile.files.content import file_content
 from kincompile.files.model_file import read_data_model
 from kincompile.files.python_file import read_python
-from kincompile.names import escaped
+from kincompile.names import escaped, listed
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from kincompile.files.adm_file import AnalysisSettings
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
 
-_DATA: dict[str, Callable[[Path, bytes], Mechanism | ConstraintSystem]] = {
+
+def _read_robot(path: Path, content: bytes, **given: Any) -> Mechanism:
+    from kincompile.files.robots.read_robot import read_robot  # SciPy
+
+    return read_robot(path, content, **given)
+
+
+_DATA: dict[str, Callable[..., Mechanism | ConstraintSystem]] = {
     ".toml": read_data_model,
     ".json": read_data_model,
     ".adm": read_adm,
+    ".urdf": _read_robot,
+    ".xml": _read_robot,
 }
-_READERS: Mapping[str, Callable[[Path, bytes], Mechanism | ConstraintSystem]] = {
+_READERS: Mapping[str, Callable[..., Mechanism | ConstraintSystem]] = {
     ".py": read_python,
     **_DATA,
 }
@@ -38,8 +47,8 @@ def read_model(path: str | os.PathLike[str]) -> Mechanism | ConstraintSystem:
     ----------
     path
         ``.py``: a Python file, which is run, with one `Mechanism` or `ConstraintSystem` at module
-        level (of several: the one called `mechanism`, `system` or `m`, in this order). ``.toml``,
-        ``.json``, ``.adm``: a data file, as for `read`.
+        level (of several: the one called `mechanism`, `system` or `m`, in this order). Others are
+        data files, as for `read`.
 
     Raises
     ------
@@ -51,14 +60,30 @@ def read_model(path: str | os.PathLike[str]) -> Mechanism | ConstraintSystem:
     return _read(Path(path), _READERS, "a Python file, ending in .py, or a data file, ending in")
 
 
-def read(path: str | os.PathLike[str]) -> Mechanism | ConstraintSystem:
+def read(
+    path: str | os.PathLike[str],
+    *,
+    loops: str | os.PathLike[str] | None = None,
+    motors: Sequence[str] | None = None,
+    pose: Mapping[str, Any] | None = None,
+) -> Mechanism | ConstraintSystem:
     """Read the model in a data file, which cannot run code.
 
     Parameters
     ----------
     path
         ``.toml`` or ``.json``: a model as `Mechanism.to_toml` and `Mechanism.to_json` write it.
-        ``.adm``: a model of simEngine2D.
+        ``.adm``: a model of simEngine2D. ``.urdf`` or ``.xml``: a robot, as URDF or MJCF; it
+        becomes a `spatial.Mechanism` whose loops are closed.
+    loops
+        Of a URDF its sidecar, in YAML. Without, and without loops in the file, one of the same name
+        that ends in ``.yaml``.
+    motors
+        Of a robot the joints that are driven, by their names in the file. Each is a parameter with
+        the joint's name.
+    pose
+        Of a robot values of joints by their names: where the search for closed loops begins. Motors
+        are led to their values. Hinges are in radians, slides in metres; a ball has (w, x, y, z).
 
     Returns
     -------
@@ -72,7 +97,14 @@ def read(path: str | os.PathLike[str]) -> Mechanism | ConstraintSystem:
     ModelError
         If it is not a model; every problem with line and field.
     """
-    return _read(Path(path), _DATA, "a data file, ending in")
+    named = {"loops": loops, "motors": motors, "pose": pose}
+    given = {key: item for key, item in named.items() if item is not None}
+    if given and _DATA.get(Path(path).suffix.lower()) is not _read_robot:
+        raise InputError(
+            f"{listed(given)}: only a robot, a file ending in .urdf or .xml, is read with these; "
+            f"leave them out for {escaped(path)}"
+        )
+    return _read(Path(path), _DATA, "a data file, ending in", **given)
 
 
 def read_analysis(path: str | os.PathLike[str]) -> AnalysisSettings:
@@ -95,8 +127,9 @@ def read_analysis(path: str | os.PathLike[str]) -> AnalysisSettings:
 
 def _read(
     file: Path,
-    readers: Mapping[str, Callable[[Path, bytes], Mechanism | ConstraintSystem]],
+    readers: Mapping[str, Callable[..., Mechanism | ConstraintSystem]],
     what: str,
+    **given: Any,
 ) -> Mechanism | ConstraintSystem:
     reader = readers.get(file.suffix.lower())
     content = file_content(file, endings=_READERS)
@@ -104,4 +137,4 @@ def _read(
         raise InputError(
             f"cannot read a model from {escaped(file)}: a model is {what} {' or '.join(_DATA)}"
         )
-    return reader(file, content)
+    return reader(file, content, **given)

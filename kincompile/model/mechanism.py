@@ -60,6 +60,8 @@ class Mechanism(MatrixViews, TextViews):
         commands of these names read them, and `to_toml` writes them.
     drawn
         Of a drawing the places of joints by name, in the frame of each body by its name.
+    links
+        Of a robot's file the body of each link by its name there, and its placement (4, 4) on it.
     """
 
     fixed: ClassVar[Body] = GROUND
@@ -88,6 +90,7 @@ class Mechanism(MatrixViews, TextViews):
         self.gravity: Scalars = (0,) * len(self.fixed.kind.axes)
         self.tasks: Mapping[str, Any] = {}
         self.drawn: dict[str, Mapping[str, Point]] = {}
+        self.links: Mapping[str, tuple[str, Any]] = {}
 
     @property
     def end(self) -> float:
@@ -267,6 +270,7 @@ class Mechanism(MatrixViews, TextViews):
             end=self.end_given,
             points=self.points,
             tasks=self.tasks,
+            links=self.links,
         )
 
     def __repr__(self) -> str:

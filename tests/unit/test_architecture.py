@@ -64,7 +64,7 @@ RUNTIME = "runtime"
 # loads the modules of the one that is emitted, the command line the command that is called, and the
 # compiler the stages that a model needs. The options of a motion are formulas: to read them takes
 # SymPy, and to print a help does not; so do the tables of sweeps, tolerances and fits. Masses and
-# forces are loaded where a mechanism has any.
+# forces are loaded where a mechanism has any, and SciPy for a robot's file.
 DEFERRED = {
     PACKAGE,
     "kincompile.cli",
@@ -78,6 +78,7 @@ DEFERRED = {
     "kincompile.compiler",
     "kincompile.exercises.kit",
     "kincompile.files.dimensions",
+    "kincompile.files.files",
     "kincompile.further",
     "kincompile.files.file_format",
     "kincompile.files.model_file",

@@ -1,0 +1,1 @@
+"""Descriptions of robots: URDF with its loops, and MJCF, as mechanisms in space."""
