@@ -134,24 +134,30 @@ def load_example(path: Path) -> Example:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def compiler_of_session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str | None]:
-    """Let the C target build in a cache of this session, without optimization.
+def compiler_of_session(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[str | None]:
+    """Let the C target build without optimization, in a cache that all processes and runs share.
 
     What the optimization does is left to the tests that ask for the machine's own compiler, whose
-    path is the fixture's value; None where there is none.
+    path is the fixture's value; None where there is none. The cache names a library by its source
+    and its flags, the compiler's path among them: in pytest's own cache that is always the same.
     """
     compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
     if compiler is None:
         yield None
         return
-    folder = tmp_path_factory.mktemp("native")
+    kept = getattr(request.config, "cache", None)
+    folder = kept.mkdir("native") if kept else tmp_path_factory.mktemp("native")
     quick = folder / "quick-cc"
-    quick.write_text(
-        '#!/bin/sh\nfor word do shift\ncase "$word" in -O[13]) word=-O0;; esac\n'
+    written = folder / f"quick-cc-{os.getpid()}"
+    written.write_text(
+        '#!/bin/sh\nfor word do shift\ncase "$word" in -O[123]) word=-O0;; esac\n'
         '[ "$word" = -D_WHOLE_REGISTERS ] || set -- "$@" "$word"; done\n'
         f'exec {compiler} "$@"\n'
     )
-    quick.chmod(0o755)
+    written.chmod(0o755)
+    written.replace(quick)
     before = {name: os.environ.get(name) for name in ("CC", "XDG_CACHE_HOME")}
     os.environ.update(CC=str(quick), XDG_CACHE_HOME=str(folder / "cache"))
     yield compiler
