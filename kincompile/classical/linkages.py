@@ -189,6 +189,41 @@ def peaucellier(scale: float = 1.0, *, length_unit: str = "m") -> Sketch:
     return s
 
 
+def dwell_six_bar(scale: float = 1.0, *, length_unit: str = "m") -> Sketch:
+    """Return a six-bar whose output rests for 126 degrees of the crank, within 0.1 degrees.
+
+    The coupler point P of a crank-rocker goes along an arc of a circle about D while the crank
+    turns from 120 to 247 degrees, so that the rod P D holds the output E D; then this swings by
+    36.1 degrees.
+
+    Parameters
+    ----------
+    scale
+        Factor of all lengths; the crank is 1.
+    length_unit
+        Unit of length.
+
+    Notes
+    -----
+    The construction of the textbooks, such as Norton, Design of Machinery, linkages with dwells. A
+    coupler as long as the rocker and as B P makes the curve of P symmetric, so that the circle of
+    least squares about its axis is near for long. Dimensions ours.
+    """
+    s = _sketch("dwell_six_bar", length_unit)
+    pivot = s.length("E_x", 9.26 * scale), s.length("E_y", 8.5 * scale)
+    s.ground(O=(0, 0), C=(s.length("OC", 3.5 * scale), 0), E=pivot)
+    _joints(s, scale, A=(1, 0), B=(2.25, 4.32), P=(5.99, 6.83), D=(7.85, 10.57))
+    equal = s.length("AB", 4.5 * scale)
+    s.link("crank", "O A", s.length("OA", scale))
+    s.link("coupler", "A B P", AB=equal, BP=equal, AP=s.length("AP", 8.457 * scale))
+    s.link("rocker", "C B", equal)
+    s.link("rod", "P D", s.length("PD", 4.175 * scale))
+    s.link("output", "E D", s.length("ED", 2.5 * scale))
+    s.drive("crank", 2 * pi * t)
+    s.point("P")
+    return s
+
+
 def klann(scale: float = 1.0, *, length_unit: str = "mm") -> Sketch:
     """Return Joe Klann's leg: the foot G of a turn of the crank strides and is lifted.
 
@@ -203,7 +238,7 @@ def klann(scale: float = 1.0, *, length_unit: str = "mm") -> Sketch:
     -----
     The linkage of US patent 6,260,862, with lengths as published at boim.com/Walkin8r.
     """
-    s = _sketch("klann", length_unit)
+    s = _sketch("klann", length_unit, end=4.0)
     lower, upper = (s.length(name, value * scale) for name, value in (("BH", 23.7), ("DE", 34.1)))
     s.ground(A=(0, 0), B=(-38.8 * scale, -12.5 * scale), D=(-14.6 * scale, 41.9 * scale))
     _joints(s, scale, C=(17, 0), H=(-20, 4), F=(-55, 12), E=(-40, 65), G=(-40, -40))
@@ -212,7 +247,7 @@ def klann(scale: float = 1.0, *, length_unit: str = "mm") -> Sketch:
     s.link("lower_rocker", "B H", lower)
     s.link("upper_rocker", "D E", upper)
     s.link("leg", "E F G", **_lengths(s, scale, EF=57.7, FG=59.0, EG=111.7))
-    s.drive("crank", -2 * pi * t)
+    s.drive("crank", -pi / 2 * t)
     return s
 
 
@@ -249,8 +284,8 @@ def jansen(scale: float = 1.0, *, length_unit: str = "mm") -> Sketch:
     return s
 
 
-def _sketch(name: str, length_unit: str) -> Sketch:
-    return Sketch(name, length_unit=length_unit, end=1.0, points=361)
+def _sketch(name: str, length_unit: str, end: float = 1.0) -> Sketch:
+    return Sketch(name, length_unit=length_unit, end=end, points=361)
 
 
 def _joints(s: Sketch, scale: float, **places: tuple[float, float]) -> None:

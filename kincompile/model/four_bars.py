@@ -22,7 +22,7 @@ class FourBarLoop(NamedTuple):
 
     joints: tuple[str, ...]
     links: tuple[str, ...]
-    lengths: tuple[sympy.Expr, ...]
+    lengths: tuple[sympy.Expr | float, ...]
     driver: str
     driven: str
 

@@ -249,10 +249,18 @@ class Drive(Driven):
     )
 
 
+@declared
+class Point:
+    """A joint whose place and path are asked for; free ends of links are points without it."""
+
+    point: str = given(kind.TEXT, "Name of the joint.")
+
+
 TABLES: Mapping[str, type] = {"body": Body, "point": BodyPoint, "sketch": Drawing}
 """Tables that are others in space."""
 
 PARTS: Mapping[str, type] = {
     "link": Link, "wheel": Wheel, "slider": Slider, "slot": Slot, "gear": Gear, "drive": Drive,
+    "point": Point,
 }  # fmt: skip
 """Parts of a drawing: methods of `Sketch`, and their arguments in order."""

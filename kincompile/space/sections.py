@@ -83,6 +83,6 @@ TABLES: Mapping[str, type] = {"body": Placed, "point": SpatialPoint, "sketch": D
 """Tables that are others in the plane."""
 
 PARTS: Mapping[str, type] = {
-    "link": Link, "slider": Slider, "rod": Rod, "drive": plane.Driven,
+    "link": Link, "slider": Slider, "rod": Rod, "drive": plane.Driven, "point": plane.Point,
 }  # fmt: skip
 """Parts of a drawing: methods of `spatial.Sketch`, and their arguments in order."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
+from kincompile.model.four_bars import FourBarLoop, four_bar_loops
 from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint
 from kincompile.view.body_shapes import links, outlines
@@ -75,6 +76,7 @@ class Drawing:
     marks: tuple[Mark, ...]  # all shapes, from back to front
     joints: tuple[JointLabel, ...]
     size: float  # the length in which pins and blocks are measured
+    four_bars: tuple[FourBarLoop, ...] = ()  # with numbers as lengths
 
     @property
     def dots(self) -> tuple[Dot, ...]:
@@ -112,6 +114,7 @@ class Drawing:
             for mark in self.marks
         ]
         data["overhang"] = OVERHANG * self.size
+        data["four_bars"] = [item._asdict() for item in self.four_bars]
         looks: dict[str, Any] = drawn_by("looks", self.dimension)()
         return data | looks
 
@@ -172,7 +175,11 @@ def drawing(
     # In space what is nearer depends on the view.
     ordered = lengthened if dimension > PLANE else sorted(lengthened, key=_depth)
     labels = _labels(system, places, geometry)
-    return Drawing(system.name, names, frames, tuple(ordered), labels, size)
+    four_bars = tuple(
+        item._replace(lengths=tuple(map(geometry.number, item.lengths)))
+        for item in four_bar_loops(system)
+    )
+    return Drawing(system.name, names, frames, tuple(ordered), labels, size, four_bars)
 
 
 def _labels(

@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from kincompile.criteria import SAME
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
+from kincompile.names import ROLES, TRIPLE
 from kincompile.report.picture import svg_element
+from kincompile.runtime.results.grashof import CHANGE
 from kincompile.runtime.singular.events import DOUBTS, SENTENCES
 from kincompile.runtime.solve import WORDS
 from kincompile.runtime.status import Status
@@ -79,6 +82,7 @@ def page_data(
         "equations": list(system.equations),
         "parameters": [_parameter(item, values[item.name]) for item in system.parameters],
         "start": (q[0] if starts_there and np.isfinite(q[0]).all() else guess).tolist(),
+        "grashof": {"roles": ROLES, "triple": TRIPLE, "change": CHANGE, "same": SAME},
         "words": {**WORDS, **SENTENCES, **DOUBTS},
         "guess": guess.tolist(),
         "guessResidual": _at_guess(system, shapes, guess, t[0], p),

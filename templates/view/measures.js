@@ -269,6 +269,22 @@ function pathMeasures(x, y, from, to) {
   return { straight, angle: Math.abs(angle) < 1e-12 ? 0 : angle, round: most(p => away(p) - radius), radius, centre };
 }
 
+/* The Grashof type of a four-bar, as kincompile/runtime/results/grashof.py finds it. */
+function grashofOf({ joints, links, lengths }) {
+  const { roles, triple, change, same } = player.data.grashof, least = Math.min(...lengths);
+  const around = lengths.reduce((sum, length) => sum + length), shortest = lengths.indexOf(least);
+  const margin = around - 2 * (least + Math.max(...lengths));
+  const isChange = Math.abs(margin) <= same * around;
+  const type = isChange ? change : margin > 0 ? roles[shortest] : triple;
+  const full = isChange || margin < 0 ? [] : shortest ? [links[shortest]] : links.slice(1);
+  return { name: joints.join(' '), type, shortest: links[shortest], margin, full };
+}
+
+/* The four-bars whose links have lengths, with the parameters that are shown. */
+function fourBarsOf() {
+  return player.data.drawing.four_bars.filter(({ lengths }) => Math.min(...lengths) > 0).map(grashofOf);
+}
+
 const measures = {
   solved: null,  // the motion whose measures are shown
   within: 0.01,  // part of its stroke by which an output at rest may be off
@@ -312,6 +328,17 @@ const measures = {
     return table.tBodies[0].rows.length ? [wide(table)] : [];
   },
 
+  /* A table of the types of four-bars; nothing without any. */
+  fourBars() {
+    const table = tableOf(['four-bar', 'Grashof type', 'shortest', units.titled('p + q − s − l', player.data.lengthUnit), 'turns wholly']);
+    const found = fourBarsOf();
+    for (const { name, type, shortest, margin, full } of found) {
+      const texts = [type, shortest, shortNumber(margin), full.join(', ') || '–'];
+      table.tBodies[0].insertRow().append(cell(name, 'th'), ...texts.map(text => cell(text)));
+    }
+    return found.length ? [wide(table)] : [];
+  },
+
   /* Of the motion that the page solved for last; the one it was made with is solved for once. */
   show() {
     const motion = live.motionNow();
@@ -328,6 +355,6 @@ const measures = {
     for (const [k, title] of ['rests at min [s]', 'rests at max [s]'].entries()) {
       table.tBodies[0].insertRow().append(cell(title, 'th'), ...rests.map(item => cell(shortNumber(item[k]))));
     }
-    this.holder.replaceChildren(wide(table), ...this.paths(motion));
+    this.holder.replaceChildren(wide(table), ...this.paths(motion), ...this.fourBars());
   },
 };

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 import kincompile as kc
+from kincompile.names import ROLES, TRIPLE
+from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.results.grashof import CHANGE, four_bar_types
 from kincompile.view.drawing import drawing
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -229,6 +232,33 @@ def test_that_measures_are_those_of_python(open_page: Callable[..., Any]) -> Non
             assert own["radius"] == pytest.approx(circle.radius, rel=1e-6)
             assert own["centre"] == pytest.approx(circle.place, rel=1e-6, abs=1e-8)
             assert f"{point} [" in shown
+    page.close()
+
+
+def test_that_grashof_types_follow_the_lengths(open_page: Callable[..., Any]) -> None:
+    """As Python has them: all types, equal lengths, and lengths that cannot be assembled."""
+    model = crank_rocker("typed")
+    module, page, seen = kc.compile(model), open_page(model), set()
+    page.get_by_role("tab", name="Measures").click()
+    for a, b, c, d in (
+        (1, 3, 2.5, 3.5), (3.2, 3, 1, 3.5), (3, 3.5, 3, 1), (3, 1, 3.5, 4), (2, 2.5, 3, 4),
+        (2, 3, 3, 4), (2, 2, 2, 2), (1, 1, 1, 30),
+    ):  # fmt: skip
+        values = {"a": a, "b": b, "c": c, "d": d}
+        page.evaluate(SOLVED, values)
+        (known,) = four_bar_types(code_of(module), np.array([a, b, c, d], dtype=float))
+        (found,) = page.evaluate("fourBarsOf()")
+        assert found == {
+            "name": " ".join(known.joints), "type": known.type, "shortest": known.shortest,
+            "margin": pytest.approx(known.margin, abs=1e-12), "full": list(known.full),
+        }  # fmt: skip
+        shown = page.locator("#panel-measures table", has_text="Grashof type").inner_text()
+        assert known.type in shown
+        assert f"{known.margin:.6g}" in shown
+        seen.add(known.type)
+    assert seen == {*ROLES, TRIPLE, CHANGE}
+    page.evaluate(SOLVED, {"a": 0.0})  # a link without length is none
+    assert page.evaluate("fourBarsOf()") == []
     page.close()
 
 

@@ -13,13 +13,16 @@ from tests.physics.test_sketched_mechanisms import meet
 DEVIATION = 0.00975373308636
 """Of Hoeken's and Chebyshev's line, with a stroke of 4: computed with 30 digits, two ways."""
 
-NAMES = ("chebyshev", "evans", "hoeken", "jansen", "klann", "peaucellier", "roberts", "watt")
+NAMES = (
+    "chebyshev", "dwell_six_bar", "evans", "hoeken", "jansen", "klann", "peaucellier", "roberts",
+    "watt",
+)  # fmt: skip
 
 
 def path(sketch, times=None, joint="P", p=None):
     """Return times and the complex path of a joint; the motion starts as drawn, without a word."""
     mechanism = sketch.mechanism()
-    times = np.linspace(0, 1, mechanism.points) if times is None else times
+    times = np.linspace(0, mechanism.end, mechanism.points) if times is None else times
     solution = kc.solve(kc.compile(mechanism), times, p)
     assert solution.success, solution.message
     return times, solution[f"{joint}.x"] + 1j * solution[f"{joint}.y"]
@@ -94,17 +97,28 @@ def test_that_the_line_of_peaucelliers_cell_is_exact(p):
     np.testing.assert_allclose(P.imag, along, rtol=0, atol=1e-12)
 
 
-def test_that_jansens_leg_is_the_example(example_named):
-    model = example_named("jansen").model
-    assert kc.emit(kc.linkages.jansen().mechanism()).source == kc.emit(model).source
-
-
-def test_that_klanns_leg_is_the_example(example_named):
-    example = example_named("klann")
-    t, foot = path(kc.linkages.klann(), joint="G")
-    solution = kc.solve(example.module, 4 * t)
-    expected = solution["G.x"] + 1j * solution["G.y"]
-    np.testing.assert_allclose(foot, expected, rtol=0, atol=1e-10)
+def test_that_the_six_bar_rests_on_the_circle_of_its_coupler_point():
+    """Its output by circles that meet, and its rest by counting on a fine grid."""
+    model = kc.linkages.dwell_six_bar().mechanism()
+    t = np.linspace(0, 1, 72001)
+    A, C, E = np.exp(2j * np.pi * t), 3.5, 9.26 + 8.5j
+    B = meet(A, 4.5, np.full_like(A, C), 4.5, +1)
+    P = meet(A, 8.457, B, 4.5, -1)
+    D = meet(P, 4.175, np.full_like(A, E), 2.5, +1)
+    phi = np.unwrap(np.angle(D - E))
+    solution = kc.solve(kc.compile(model), t[::200])
+    np.testing.assert_allclose(solution["output.phi"], phi[::200], rtol=0, atol=1e-11)
+    within = np.radians(0.1)
+    near = np.flatnonzero(phi >= phi.max() - within)
+    assert near[-1] - near[0] == near.size - 1
+    rest = solution.dwell("output.phi", within, "max")
+    assert rest.time == pytest.approx(t[near[-1]] - t[near[0]], abs=1e-4)
+    assert 360 * rest.time == pytest.approx(126.5, abs=0.05)  # as the docstring says
+    assert 360 * np.array([rest.start, rest.stop]) == pytest.approx([120, 247], abs=0.6)
+    assert np.degrees(np.ptp(phi)) == pytest.approx(36.1, abs=0.05)
+    circle = solution.roundness("P", (130 / 360, 230 / 360))
+    assert circle.radius == pytest.approx(4.175, abs=0.005)
+    assert circle.deviation < 1e-3
 
 
 def test_that_a_scale_that_is_no_size_is_refused_with_the_lengths():

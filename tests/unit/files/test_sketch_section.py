@@ -46,12 +46,12 @@ h = 65.7
 i = 49.0
 
 [sketch.joints]
-A = [15, 0]
-C = [-20, 30]
-D = [-70, 15]
-E = [-25, -45]
-F = [-60, -30]
-G = [-30, -95]
+A = [15.0, 0.0]
+C = [-20.0, 30.0]
+D = [-70.0, 15.0]
+E = [-25.0, -45.0]
+F = [-60.0, -30.0]
+G = [-30.0, -95.0]
 """
 
 EVERYTHING = """
@@ -76,6 +76,7 @@ parts = [
     { drive = "crank", value = "w*t" },
     { drive = "big", value = { points = [[0, 0], [1, "90*deg"]], law = "modified sine" } },
     { drive = "arm", value = "t", against = "lever" },
+    { point = "D" },
 ]
 
 [[outputs]]
@@ -106,6 +107,7 @@ parts = [
     { slider = "lift_bar", joints = "U", along = "T V" },
     { drive = "crank", value = "w*t" },
     { drive = "lift_bar", value = { points = [[0, 0], [1, "lift/4"]], law = "modified sine" } },
+    { point = "B" },
 ]
 """
 
@@ -126,6 +128,7 @@ def in_space():
     s.slider("lift_bar", "U", along="T V")
     s.drive("crank", w * kc.t)
     s.drive("lift_bar", kc.motion.sequence([(0, 0), (1, lift / 4)], law="modified sine"))
+    s.point("B")
     m = s.mechanism()
     m.output("rise", ram.z * rocker.omega[1])
     return m
@@ -154,6 +157,7 @@ def everything():
     s.drive("crank", w * kc.t)
     s.drive("big", kc.motion.sequence([(0, 0), (1, 90 * kc.deg)], law="modified sine"))
     s.drive("arm", kc.t, against="lever")
+    s.point("D")
     m = s.mechanism()
     (tool,) = (item for item in m.outputs if item.name == "T")
     m.output("gap", tool.x - ram.x, "m")
@@ -196,7 +200,7 @@ def changed(old, new):
     [
         (changed('joints = "O A"', 'joints = "O X"'), 10, "link 'crank': unknown joints X"),
         (changed('"E F G", EF', '"E F G", EX'), 16, "link 'leg', EX: EX is not a pair"),
-        (changed("link = ", "rope = "), 10, "one of link, wheel, slider, slot, gear, drive"),
+        (changed("link = ", "rope = "), 10, "one of link, wheel, slider, slot, gear, drive, point"),
         (changed('length = "m"', 'length = "mm"'), 10, "column 1 of 'mm'"),
         (changed('length = "m"', "length = -1"), 10, "the length is -1"),
         (changed('joints = "O A"', "joints = 3"), 10, "expected a text in quotes, not 3"),
@@ -209,7 +213,7 @@ def changed(old, new):
         (changed("d = 40.1", "d = 1.0"), 13, "link 'plate'"),
         (changed("a = 38.0", 'a = "38"'), 21, "expected a number"),
         (changed("[sketch.joints]", "[sketch.pins]"), 35, "there is no such field"),
-        (changed("A = [15, 0]", 'A = [15, "x_crank"]'), 36, "x_crank"),
+        (changed("A = [15.0, 0.0]", 'A = [15, "x_crank"]'), 36, "x_crank"),
         ('kincompile = 1\nname = "x"\nsketch = 3\n', 3, "expected a table, not 3"),
         ('kincompile = 1\nname = "x"\n[sketch]\nparts = 3\n', 4, "expected a list, not 3"),
     ],
@@ -246,7 +250,7 @@ def test_that_a_drawing_without_end_is_refused_at_once():
         ("O = [0, 0, 1]", "Z = [0, 0, 1]", 12, "hinge 'Z': unknown joints Z"),
         ("O = [0, 0, 1]", "O = [0, 1]", 12, "[x, y, z]"),
         ('joints = "A B"', 'joints = "A B", width = 2', 16, "width"),
-        ('{ rod = "coupler"', '{ gear = "coupler"', 16, "one of link, slider, rod, drive"),
+        ('{ rod = "coupler"', '{ gear = "coupler"', 16, "one of link, slider, rod, drive, point"),
     ],
 )
 def test_that_a_wrong_drawing_in_space_is_told_with_its_line(old, new, line, said):
