@@ -42,7 +42,8 @@ def test_that_five_poses_are_met(capsys):
     found, said = run("five_poses", capsys)
     assert "five_poses: all" in said
     assert "12 four-bars, of which 4 go through the poses in their order" in said
-    assert float(re.search(r"off the poses by (\S+) cm", said)[1]) < 1e-9
+    (off,) = re.findall(r"off the poses by (\S+) cm", said)
+    assert float(off) < 1e-9
     # The links of the cognates, by the triangles of Roberts, which are similar to the coupler's.
     O, A, B, C, P = found["linkages"][0].places  # noqa: N806, E741
     other = [abs(x) for x in ((C - O) * (P - A) / (B - A), P - A, (B - C) * (P - A) / (B - A))]
