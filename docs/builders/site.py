@@ -28,6 +28,8 @@ GENERATED = DOCS / "made"
 OUTSIDE = {
     "README.md": "index",
     "CONTRIBUTING.md": "made/contributing",
+    "CODE_OF_CONDUCT.md": "made/conduct",
+    "SECURITY.md": "made/security",
     "CHANGELOG.md": "made/changelog",
     "benchmarks/README.md": "made/benchmarks",
     "examples/README.md": "made/gallery",
@@ -54,6 +56,8 @@ def write_pages() -> None:
     """Write the pages that are made."""
     pages = {
         "contributing.md": _outside("CONTRIBUTING.md"),
+        "conduct.md": _outside("CODE_OF_CONDUCT.md"),
+        "security.md": _outside("SECURITY.md"),
         "changelog.md": _outside("CHANGELOG.md"),
         "benchmarks.md": benchmark_plots.with_plots(_outside("benchmarks/README.md")),
         "notebooks.md": _outside("examples/notebooks/README.md"),

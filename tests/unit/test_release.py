@@ -64,3 +64,17 @@ def test_that_issue_templates_ask_for_the_model():
         assert "id: model" in form.read_text(encoding="utf-8")
     wrong = text(".github/ISSUE_TEMPLATE/wrong_result.yml")
     assert re.search(r"id: model.*?required: true", wrong, re.DOTALL)
+
+
+def test_that_the_paper_cites_what_it_lists():
+    paper, listed = text("paper/paper.md"), text("paper/paper.bib")
+    keys = re.findall(r"^@\w+\{(\w+),$", listed, re.MULTILINE)
+    assert len(keys) == len(set(keys)) == listed.count("\n}")
+    assert set(re.findall(r"@(\w+)", paper.split("---", 2)[2])) == set(keys)
+
+
+def test_that_the_paper_has_the_length_and_the_parts_that_its_journal_asks_for():
+    body = text("paper/paper.md").split("---", 2)[2]
+    assert 750 <= len(body.split()) <= 1750
+    parts = re.findall(r"^# (.*)$", body, re.MULTILINE)
+    assert {"Summary", "Statement of need", "State of the field", "References"} <= set(parts)
