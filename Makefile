@@ -13,7 +13,7 @@ PYTEST := $(BIN)/python -m pytest
 
 # Tests run in as many processes as there are cores. Threads of BLAS in each of them would wait for
 # one another by spinning: two tests of 20 s, side by side on two cores, took 210 s.
-test test-slow goldens: export OPENBLAS_NUM_THREADS := 1
+test test-all test-slow goldens: export OPENBLAS_NUM_THREADS := 1
 
 # One stamp per extra, so that a second call installs nothing and the demo does not wait for test
 # tools. The environment has one too: its python is a link, and shows the age of what it links to.
@@ -27,7 +27,7 @@ BENCH_READY := $(VENV)/bench.stamp
 
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test test-all test-slow test-elsewhere lint format types budget goldens update-goldens docs pictures course bench clean
+.PHONY: help ready demo test test-all test-slow test-elsewhere lint format types budget goldens update-goldens docs pictures course bench clean
 
 help:
 	@echo "make demo            compile the wrecker boom, run it, show it on a page"
@@ -41,6 +41,9 @@ help:
 	@echo "make docs            the site: open site/index.html     make course   lessons to take along"
 	@echo "make pictures        the pictures, the notebooks and docs/joints.md"
 	@echo "make clean           remove what make has made"
+
+# All that CI needs: what comes after it may run side by side.
+ready: $(PAGES_READY) $(LINT_READY) $(DOCS_READY)
 
 $(VENV_READY): .ci/make-venv
 	@echo "Making the virtual environment $(VENV)"
@@ -80,13 +83,15 @@ demo: $(DEMO_READY)
 	@echo "  demo/wrecker_boom.html           the motion on a page: open it in a browser"
 
 test: $(TEST_READY)
-	@$(PYTEST) --numprocesses=auto --dist=loadfile
+	@$(PYTEST) --numprocesses=auto --dist=loadgroup
 
-test-all: test test-slow
+# In one run, both together make what they share once.
+test-all: $(PAGES_READY)
+	@$(PYTEST) --numprocesses=auto --dist=loadgroup -m "slow or not slow"
 
 # The exhaustive rest: packaging, pages in a browser, large corpora.
 test-slow: $(PAGES_READY)
-	@$(PYTEST) --numprocesses=auto --dist=loadfile -m slow
+	@$(PYTEST) --numprocesses=auto --dist=loadgroup -m slow
 
 # An older processor: other kernels of OpenBLAS, in two threads, and NumPy and libm without AVX2 and
 # FMA. Each rounds in its own way; variables that a system does not know do nothing. NumPy names its
@@ -102,7 +107,7 @@ test-elsewhere: export OPENBLAS_CORETYPE := Haswell
 test-elsewhere: export OPENBLAS_NUM_THREADS := 2
 test-elsewhere: export GLIBC_TUNABLES := glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usable,-FMA_Usable
 test-elsewhere: $(TEST_READY)
-	@NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c '$(FEATURES)')" $(PYTEST) --numprocesses=auto --dist=loadfile $(ROUNDED) $(NOT_ROUNDED)
+	@NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c '$(FEATURES)')" $(PYTEST) --numprocesses=auto --dist=loadgroup $(ROUNDED) $(NOT_ROUNDED)
 
 # The scripts of a page share one scope, so that each kind of page is read by itself.
 PAGES := plane space gallery watch

@@ -41,24 +41,16 @@ TOGETHER = ("tests/targets/", "tests/unit/files/test_hostile.py")
 all hostile files, takes a minute and more to find out."""
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Return what gives tests to processes with `--dist=loadfile`, as the Makefile asks."""
-    if config.getvalue("dist") != "loadfile":
-        return None
-    from xdist.scheduler import LoadScopeScheduling  # several processes are optional
-
-    class Together(LoadScopeScheduling):  # type: ignore[misc]
-        """One process has the tests of a file, which share what is made; slow ones go alone."""
-
-        def _split_scope(self, nodeid: str) -> str:
-            path, _, _ = nodeid.partition("::")
-            for place in TOGETHER:
-                if path.startswith(place):
-                    return place
-            return nodeid if config.option.markexpr == "slow" else path
-
-    return Together(config, log)
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Let one process have the tests of a file, which share what is made; slow ones go alone."""
+    if not config.getoption("loadgroup", False):  # `--dist=loadgroup`, as the Makefile asks
+        return
+    for item in items:
+        path, _, _ = item.nodeid.partition("::")
+        place = next((place for place in TOGETHER if path.startswith(place)), path)
+        if place != path or path in TOGETHER or not item.get_closest_marker("slow"):
+            item.add_marker(pytest.mark.xdist_group(place))
 
 
 def pytest_collection_finish() -> None:
