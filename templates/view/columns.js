@@ -18,6 +18,7 @@ const columns = {
   groups() {
     if (this.made?.count !== stage.points.length) {
       const groups = this.all();
+      for (const item of groups.flatMap(group => group.items)) item.title ??= item.label;
       const items = groups.flatMap(group => group.items);
       this.made = { count: stage.points.length, groups, items: new Map(items.map(item => [item.label, item])) };
     }
@@ -70,7 +71,7 @@ function ordersOf(titles, owners, array, all) {
   return RATES.map(([order, per], k) => ({
     title: titles[k],
     items: owners.map(owner => ({
-      label: owner.name + order, unit: owner.unit ? owner.unit + per : '',
+      label: owner.name + order, title: symbolText(owner.name, k), unit: owner.unit ? owner.unit + per : '',
       values: () => entries(array + order, all.indexOf(owner), all.length),
     })),
   }));

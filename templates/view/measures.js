@@ -236,6 +236,15 @@ const MEASURES = [
   ['rms', item => outputNumber(item, item.rms)],
 ];
 
+/** @type {[string, (item: any) => string][]} */
+const PATH_MEASURES = [
+  ['off a line', item => shortNumber(item.straight)],
+  ['its angle', item => `${shortNumber(item.angle * units.factor('rad'))} ${units.name('rad')}`],
+  ['off a circle', item => shortNumber(item.round)],
+  ['its radius', item => shortNumber(item.radius)],
+  ['its centre', item => item.centre.map(shortNumber).join(', ')],
+];
+
 function equalParts(first, last, count) {
   return [...Array(count + 1).keys()].map(k => first + k / count * (last - first));
 }
@@ -310,33 +319,33 @@ const measures = {
     panel.append(bar, this.holder);
   },
 
-  /* A table of the paths of points in the plane; nothing without any. */
-  paths(motion) {
-    const names = player.data.outputs.map(({ name }) => name);
+  /* One table for each output, path and four-bar: [{ name, unit, rows: [title, texts of each motion] }]. */
+  blocks(motions) {
+    const names = player.data.outputs.map(({ name }) => name), order = named(player.data).map(({ name }) => name);
+    const found = motions.map(measuresOf), [first] = found;
+    const texts = (k, textOf) => found.map(items => (items[k] ? textOf(items[k]) : '–'));
+    const outputs = first.map(({ name, unit }, k) => ({ name, unit, rows: [
+      ...MEASURES.map(([title, textOf]) => [title, texts(k, textOf)]),
+      ...['min', 'max'].map((end, side) => [`rests at ${end} [s]`, texts(k, item => shortNumber(item.rests(this.within)[side]))]),
+    ] }));
+    outputs.sort((a, b) => order.indexOf(a.name) - order.indexOf(b.name));
     const points = names.flatMap((name, k) => (name.startsWith('x_') ? [[name.slice(2), k, names.indexOf(`y_${name.slice(2)}`)]] : []))
       .filter(([name, , y]) => y >= 0 && !names.includes(`z_${name}`));
-    const table = tableOf(['path', 'off a line', units.titled('at', 'rad'), 'off a circle', 'radius', 'centre']);
-    for (const [name, ...columns] of points) {
-      const [x, y] = columns.map(k => new OutputMotion(motion, k));
-      const [start, end] = [x.t[0], x.t[x.t.length - 1]];
-      const [from, to] = this.part.map(part => start + part * (end - start));
-      if (!(to > from)) continue;
-      const found = pathMeasures(x, y, from, to), list = values => values.map(shortNumber).join(', ');
-      const texts = [shortNumber(found.straight), shortNumber(found.angle * units.factor('rad')), shortNumber(found.round), shortNumber(found.radius), list(found.centre)];
-      table.tBodies[0].insertRow().append(cell(units.titled(name, x.unit), 'th'), ...texts.map(text => cell(text)));
-    }
-    return table.tBodies[0].rows.length ? [wide(table)] : [];
+    const paths = points.map(([name, ...columns]) => {
+      const each = motions.map(motion => this.path(...columns.map(k => new OutputMotion(motion, k))));
+      return { name: `path of ${name}`, unit: player.data.outputs[columns[0]].unit,
+        rows: PATH_MEASURES.map(([title, textOf]) => [title, each.map(item => (item ? textOf(item) : '–'))]) };
+    });
+    const fourBars = fourBarsOf().map(({ name, type, shortest, margin, full }) => ({ name: `four-bar ${name}`, unit: '', rows: [
+      ['Grashof type', [type]], ['shortest', [shortest]], ['p + q − s − l', [shortNumber(margin)]], ['turns wholly', [full.join(', ') || '–']],
+    ] }));
+    return [...outputs, ...paths, ...fourBars];
   },
 
-  /* A table of the types of four-bars; nothing without any. */
-  fourBars() {
-    const table = tableOf(['four-bar', 'Grashof type', 'shortest', units.titled('p + q − s − l', player.data.lengthUnit), 'turns wholly']);
-    const found = fourBarsOf();
-    for (const { name, type, shortest, margin, full } of found) {
-      const texts = [type, shortest, shortNumber(margin), full.join(', ') || '–'];
-      table.tBodies[0].insertRow().append(cell(name, 'th'), ...texts.map(text => cell(text)));
-    }
-    return found.length ? [wide(table)] : [];
+  /* What is found of the part of a path; null where there is none. */
+  path(x, y) {
+    const [start, end] = [x.t[0], x.t[x.t.length - 1]], [from, to] = this.part.map(part => start + part * (end - start));
+    return to > from ? pathMeasures(x, y, from, to) : null;
   },
 
   /* Of the motion that the page solved for last; the one it was made with is solved for once. */
@@ -345,16 +354,16 @@ const measures = {
     if (motion === this.solved && units.angle === this.angle) return;
     this.solved = motion;
     this.angle = units.angle;
-    const order = named(player.data).map(({ name }) => name);
-    const found = measuresOf(motion).sort((a, b) => order.indexOf(a.name) - order.indexOf(b.name));
-    const table = tableOf(['', ...found.map(({ name, unit }) => units.titled(name, unit))]);
-    for (const [title, textOf] of MEASURES) {
-      table.tBodies[0].insertRow().append(cell(title, 'th'), ...found.map(item => cell(textOf(item))));
-    }
-    const rests = found.map(item => item.rests(this.within));
-    for (const [k, title] of ['rests at min [s]', 'rests at max [s]'].entries()) {
-      table.tBodies[0].insertRow().append(cell(title, 'th'), ...rests.map(item => cell(shortNumber(item[k]))));
-    }
-    this.holder.replaceChildren(wide(table), ...this.paths(motion), ...this.fourBars());
+    this.tables = this.blocks([motion]).map(({ name, unit, rows }) => {
+      const table = tableOf([]);
+      table.tHead.remove();
+      table.createCaption().append(...(name.includes(' ') ? [name] : symbolNodes(name)), unit ? ` [${units.name(unit)}]` : '');
+      for (const [title, texts] of rows) table.tBodies[0].insertRow().append(cell(title, 'th'), ...texts.map(text => cell(text)));
+      return [name, wide(table)];
+    });
+    const holder = document.createElement('div');
+    holder.className = 'blocks';
+    holder.append(...this.tables.map(([, element]) => element));
+    this.holder.replaceChildren(rowFinder('Find a measure', () => this.tables), holder);
   },
 };

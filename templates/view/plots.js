@@ -18,8 +18,7 @@ class Plot {
     bar.className = 'bar';
     this.choice = document.createElement('select');
     this.choice.setAttribute('aria-label', 'What is plotted');
-    for (const group of columns.groups()) this.choice.append(optionGroup(group));
-    this.choice.value = label;
+    this.fill(label);
     this.choice.addEventListener('change', () => this.redraw());
     bar.append(this.choice, this.saving(), buttonOf('×', () => plots.remove(this), 'Remove this plot'));
     this.svg = svgElement('svg', { tabindex: 0, role: 'img' });
@@ -27,6 +26,14 @@ class Plot {
     this.element.append(bar, this.svg, this.reading);
     this.pointed = null;  // index of the time that the pointer is at
     this.listen();
+  }
+
+  /* Offer what contains a text, and what is chosen. */
+  fill(chosen, text = '') {
+    const isOffered = ({ label, title }) => label === chosen || contains(label, text) || contains(title, text);
+    const groups = columns.groups().map(({ title, items }) => ({ title, items: items.filter(isOffered) }));
+    this.choice.replaceChildren(...groups.filter(({ items }) => items.length).map(optionGroup));
+    this.choice.value = chosen;
   }
 
   saving() {
@@ -65,15 +72,17 @@ class Plot {
     this.names = [over?.label ?? 't', y.label];
     this.units = [over?.unit ?? 's', y.unit];
     this.labels = this.names.map((name, k) => units.titled(name, this.units[k]));
+    this.titles = [over?.title ?? 't', y.title];
+    this.shown = this.titles.map((title, k) => units.titled(title, this.units[k]));
   }
 
   redraw() {
     this.read();
     const { width, height } = this.size = this.sizes();
-    const type = Math.round(0.76 * stage.type);
+    const type = Math.max(12, Math.round(0.8 * stage.type));
     this.box = { left: 4 * type, right: width - 1.3 * type, top: 1.9 * type, low: height - 3 * type };
     setAttributes(this.svg, { viewBox: `0 0 ${width} ${height}`, width, height, 'font-size': type,
-      'font-family': 'system-ui, sans-serif', 'aria-label': `${this.labels[1]} over ${this.labels[0]}` });
+      'font-family': 'system-ui, sans-serif', 'aria-label': `${this.shown[1]} over ${this.shown[0]}` });
     this.ranges();
     this.draw(type);
     this.move(player.state);
@@ -131,8 +140,8 @@ class Plot {
     for (const [y, label] of isEmpty ? [] : this.levels(type, step_x)) {
       parts.push(line(left, y, right, y), text(left - 5, y + 0.35 * type, 'end', label));
     }
-    parts.push(text((left + right) / 2, low + 2.6 * type, 'middle', this.labels[0], { fill: palette.ink }));
-    parts.push(text(0, 1.1 * type, 'start', this.labels[1], { fill: palette.ink }));
+    parts.push(text((left + right) / 2, low + 2.6 * type, 'middle', this.shown[0], { fill: palette.ink }));
+    parts.push(text(0, 1.1 * type, 'start', this.shown[1], { fill: palette.ink }));
     parts.push(...this.eventLines(palette), this.curve(palette));
     if (isEmpty) {
       const said = hasMotion() ? 'No numbers were found.' : 'No position was found.';
@@ -210,7 +219,7 @@ class Plot {
     const written = (name, value, unit) => `${name} = ${units.full(value ?? NaN, unit)}`;
     const shown = (values, k) => {
       const value = values[index] === null ? NaN : values[index] / units.factor(this.units[k]);
-      return this.isLog && k ? `${this.names[k]} = ${value.toExponential(3)}` : written(this.names[k], value, this.units[k]);
+      return this.isLog && k ? `${this.titles[k]} = ${value.toExponential(3)}` : written(this.titles[k], value, this.units[k]);
     };
     const time = this.isOverTime ? [] : [written('t', player.t[index], 's')];
     this.reading.textContent = [...time, shown(this.x, 0), shown(this.y, 1)].join(',  ');
@@ -333,7 +342,7 @@ function centred([a, b], length) {
 function optionGroup(group) {
   const element = document.createElement('optgroup');
   element.label = group.title;
-  element.append(...group.items.map(({ label }) => new Option(label, label)));
+  element.append(...group.items.map(({ label, title }) => new Option(title, label)));
   return element;
 }
 
@@ -376,10 +385,12 @@ const plots = {
     bar.className = 'bar';
     this.choice = document.createElement('select');
     this.choice.id = 'over';
-    this.choice.append(...[TIME, ...this.overs()].map(name => new Option(name, name)));
+    this.choice.append(...[TIME, ...this.overs()].map(name => new Option(symbolText(name), name)));
     this.choice.addEventListener('change', () => this.zoom(null));
     label.append('Over ', this.choice);
-    bar.append(label, buttonOf('All', () => this.zoom(null), 'All of the axis'));
+    const count = columns.groups().flatMap(({ items }) => items).length;
+    const find = findBox('Find what to plot', () => count, text => this.list.forEach(plot => plot.fill(plot.choice.value, text)));
+    bar.append(label, find, buttonOf('All', () => this.zoom(null), 'All of the axis'));
     const more = buttonOf('Another plot', () => this.add(columns.groups()[0].items[0].label));
     more.id = 'another';
     this.parts = [bar, this.holder, more];
@@ -402,9 +413,9 @@ const plots = {
     return this.choice.value === TIME ? null : columns.find(this.choice.value);
   },
 
-  /* Three plots fill a screen. */
+  /* Two plots fill the panel of a full screen. */
   height() {
-    return isProjected() ? Math.max(150, (innerHeight - 18.5 * stage.type) / 3) : 12.5 * stage.type;
+    return isProjected() ? Math.max(9 * stage.type, byId('right').clientHeight / 2 - 6.5 * stage.type) : 12.5 * stage.type;
   },
 
   /* Plots that are seen again may have another width. */
@@ -415,7 +426,8 @@ const plots = {
 
   /* Take the room there is: asked once, since a browser lays out the page to answer. */
   measure() {
-    if (this.holder?.clientWidth) this.width = Math.max(240, this.holder.clientWidth);
+    const { width } = this.holder?.getBoundingClientRect() ?? { width: 0 };
+    if (width) this.width = Math.max(240, Math.floor(width));
   },
 
   resize() {

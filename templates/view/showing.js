@@ -17,7 +17,7 @@ const showing = {
 
   theme() {
     stage.palette = paletteNow();
-    byId('theme').textContent = stage.palette.isDark ? 'Light' : 'Dark';
+    byId('theme').ariaPressed = String(stage.palette.isDark);
     if (hasBodies) tools.colour();
     plots.redraw();
     player.refresh();
@@ -25,7 +25,7 @@ const showing = {
 
   angles() {
     units.angle = units.angle === 'rad' ? 'deg' : 'rad';
-    byId('angles').textContent = units.angle === 'rad' ? 'deg' : 'rad';
+    byId('angles').ariaPressed = String(units.angle === 'deg');
     live.showValues();
     if (shownPanel === 'measures') measures.show();
     plots.zoom(null);
@@ -51,6 +51,7 @@ const showing = {
   layOut() {
     stage.resize();
     plots.resize();
+    document.documentElement.style.setProperty('--drawn', `${byId('drawn').offsetHeight}px`);
     player.refresh();
   },
 

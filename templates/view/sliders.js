@@ -24,7 +24,7 @@ class Slider {
     });
     for (const element of [slider, box]) element.addEventListener('change', done);
     this.row = document.createElement('div');
-    this.row.append(label, slider, box);
+    this.row.append(label, box, slider);
     holder.append(this.row);
     this.reach(low, high);
   }
@@ -51,7 +51,8 @@ class Slider {
   show(value) {
     const { name, unit, slider, box, label, step } = this, factor = units.factor(unit), shown = units.name(unit);
     this.value = value;
-    label.textContent = units.titled(name, unit);
+    label.replaceChildren(...symbolNodes(name), unit ? ` [${shown}]` : '');
+    slider.ariaLabel = units.titled(name, unit);
     Object.assign(box, { step: factor === 1 ? step : 'any', ariaLabel: shown ? `${name} in ${shown}` : name });
     slider.value = String(value);
     if (document.activeElement !== box) box.value = String(+(factor * value).toPrecision(6));

@@ -152,8 +152,7 @@ const orbit = {
       player.refresh();
     });
     made.ariaPressed = 'false';
-    bar.style.marginTop = '.5rem';
-    document.getElementById('drawn').append(bar);
+    document.getElementById('tools').before(bar);
     stage.canvas.addEventListener('contextmenu', event => event.preventDefault());
     for (const id of ['poles', 'centrodes']) document.getElementById(id).closest('label').hidden = true;
     const pointing = document.getElementById('pointing'), moves = 'moves the drawing';

@@ -19,6 +19,7 @@ const DOTS = 24;  // equal times that are marked on it
 const APART = 10;  // pixels between them, on the mean
 const ARROW = 0.2;  // part of the canvas that the longest velocity and acceleration take
 const CLOSEST = 200;  // largest zoom
+const UPRIGHT = 0.36;  // part of a phone's height that the drawing takes at most
 const CLICK = 4;  // pixels that a pointer may move in a click
 
 class Stage {
@@ -49,10 +50,10 @@ class Stage {
 
   resize() {
     this.type = fontSize();
-    const width = this.canvas.parentElement.clientWidth;
-    const most = Math.max(240, innerHeight - (isProjected() ? 11 : 18) * this.type);
-    const wanted = isProjected() ? most : Math.max(0.45 * width, width / proportions(this.first) + 4 * NEAR);
-    const height = Math.max(220, Math.min(most, wanted));
+    const holder = this.canvas.parentElement, width = holder.clientWidth;
+    const wanted = Math.max(0.45 * width, width / proportions(this.first) + 4 * NEAR);
+    const isFilled = getComputedStyle(holder).getPropertyValue('--fills') !== '';
+    const height = isFilled ? holder.clientHeight : Math.max(180, Math.min(UPRIGHT * innerHeight, wanted));
     const dense = devicePixelRatio || 1;
     this.canvas.width = Math.round(width * dense);
     this.canvas.height = Math.round(height * dense);

@@ -247,12 +247,15 @@ function start() {
   newtonPanel(byId('panel-newton'));
   stage.overlays.push((ctx, view, palette) => live.drawGhost(ctx, view, palette));
   player.onChange(showState);
-  let width = null;
-  new ResizeObserver(([{ contentRect }]) => {
-    if (contentRect.width === width) return;  // what is said below the drawing is no reason to change it
-    width = contentRect.width;
+  let sizes = '';
+  const observer = new ResizeObserver(() => {
+    // What is said beside the drawing is no reason to change it.
+    const { clientWidth, clientHeight } = byId('stage'), found = [clientWidth, clientHeight, byId('right').clientWidth].join();
+    if (found === sizes) return;
+    sizes = found;
     showing.layOut();
-  }).observe(byId('left'));
+  });
+  for (const id of ['stage', 'right']) observer.observe(byId(id));
   player.onMotion(forget);
   transmission.build(byId('panel-transmission'));
   connectTabs();

@@ -28,6 +28,35 @@ function wide(table) {
   return holder;
 }
 
+/* The name of a coordinate, an output or a parameter at the head of a row. */
+function nameCell(name) {
+  const element = document.createElement('th');
+  Object.assign(element, { title: name, ariaLabel: name, scope: 'row' });
+  element.append(...symbolNodes(name));
+  return element;
+}
+
+const MANY = 12;  // entries of a list, above which it can be searched
+
+function contains(text, part) {
+  return text.toLowerCase().includes(part.trim().toLowerCase());
+}
+
+/* A box to search a long list with; `count` says how long it is, `act` takes the text. */
+function findBox(name, count, act) {
+  const box = document.createElement('input');
+  Object.assign(box, { type: 'search', placeholder: 'Find …', ariaLabel: name, hidden: count() <= MANY });
+  box.addEventListener('input', () => act(box.value));
+  return box;
+}
+
+/* A box that hides the rows of a list, [text, element], that do not have its text. */
+function rowFinder(name, rows) {
+  return findBox(name, () => rows().length, part => {
+    for (const [text, element] of rows()) element.hidden = !contains(text, part);
+  });
+}
+
 const numbers = {
   build(panel) {
     const bar = document.createElement('div');
@@ -39,17 +68,16 @@ const numbers = {
       this.copy.textContent = isDone ? 'Copied' : 'Not allowed';
       setTimeout(() => { this.copy.textContent = 'Copy'; }, 1500);
     }));
-    bar.append(this.at, this.copy);
     this.motion = tableOf(['coordinate', 'unit', 'position', 'velocity', 'acceleration']);
     this.rows = player.data.coordinates.map(({ name, unit }) => {
       const row = this.motion.tBodies[0].insertRow();
-      row.append(cell(name, 'th'), cell(unit), cell(''), cell(''), cell(''));
+      row.append(nameCell(name), cell(unit), cell(''), cell(''), cell(''));
       return row;
     });
     this.outputs = tableOf(['output', 'unit', 'value', 'rate', 'second rate']);
     this.observed = player.data.outputs.map(({ name, unit }) => {
       const row = this.outputs.tBodies[0].insertRow();
-      row.append(cell(name, 'th'), cell(unit), cell(''), cell(''), cell(''));
+      row.append(nameCell(name), cell(unit), cell(''), cell(''), cell(''));
       return row;
     });
     this.equations = tableOf(['constraint', 'type', '|Phi|']);
@@ -58,6 +86,9 @@ const numbers = {
       row.append(cell(name, 'th'), cell(is_driver ? `${kind}, driver` : kind), cell(''));
       return row;
     });
+    const named = [[this.rows, player.data.coordinates], [this.observed, player.data.outputs], [this.joints, player.data.drawing.joints]];
+    const find = rowFinder('Find in the tables', () => named.flatMap(([rows, items]) => rows.map((row, k) => [`${items[k].name} ${symbolText(items[k].name)}`, row])));
+    bar.append(this.at, find, this.copy);
     panel.append(bar, ...(this.observed.length ? [wide(this.outputs)] : []), wide(this.motion), wide(this.equations));
   },
 
@@ -126,7 +157,8 @@ const points = {
     this.table = table;
     this.rows = [];
     for (const point of stage.points) this.addRow(point);
-    panel.append(wide(table), this.form());
+    const find = rowFinder('Find a point', () => this.rows.map(({ row, point }) => [`${point.name} ${point.kind}`, row]));
+    panel.append(find, wide(table), this.form());
   },
 
   addRow(point) {

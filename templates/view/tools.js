@@ -182,7 +182,8 @@ const tools = {
       chip.addEventListener('pointerleave', () => stage.hover(null));
       return chip;
     });
-    byId('legend').replaceChildren(...this.chips);
+    const find = rowFinder('Find a body', () => this.chips.map(chip => [chip.textContent, chip]));
+    byId('legend').replaceChildren(find, ...this.chips);
   },
 
   colour() {

@@ -73,3 +73,27 @@ function largestOfUnits({ coordinates, outputs, arrays, lengthUnit, drawing }) {
   grow(lengthUnit, drawing.size);
   return scales;
 }
+
+/* ---- names as derivations print them ---- */
+
+const LETTERS = 'alpha α beta β gamma γ delta δ epsilon ε zeta ζ eta η theta θ iota ι kappa κ lambda λ mu μ nu ν xi ξ rho ρ sigma σ tau τ phi φ chi χ psi ψ omega ω'.split(' ');
+
+/* Letter, dots and index of a name: phi_boom is φ with the index boom; a word has its rate before it. */
+function symbolOf(name, order = 0) {
+  const [head, ...rest] = name.split('_'), place = LETTERS.indexOf(head), index = rest.join('_');
+  const letter = place >= 0 && place % 2 === 0 ? LETTERS[place + 1] : head, isLetter = letter.length === 1;
+  if (!head) return { letter: name, index: '' };
+  return { letter: isLetter ? letter + ['', '\u0307', '\u0308'][order] : ['', 'd/dt ', 'd²/dt² '][order] + letter, index };
+}
+
+function symbolText(name, order = 0) {
+  const { letter, index } = symbolOf(name, order);
+  return index ? `${letter}_${index}` : letter;
+}
+
+function symbolNodes(name) {
+  const { letter, index } = symbolOf(name), [base, low] = ['span', 'sub'].map(tag => document.createElement(tag));
+  [base.textContent, low.textContent] = [letter, index];
+  if ([...letter].length === 1) base.style.fontStyle = 'italic';
+  return index ? [base, document.createElement('wbr'), low] : [base];
+}

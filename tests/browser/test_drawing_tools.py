@@ -116,7 +116,7 @@ def test_that_a_body_that_is_pointed_at_tells_how_it_turns(open_page: Any) -> No
     omega = -np.cos(ANGLE) / (3 * np.cos(beta))
     alpha = (np.sin(ANGLE) / 3 + np.sin(beta) * omega**2) / np.cos(beta)
     np.testing.assert_allclose(numbers(tip), (beta, omega, alpha), atol=1e-4)
-    page.get_by_role("button", name="deg", exact=True).click()
+    page.get_by_role("button", name="Degrees").click()
     page.mouse.move(*on_page(page, middle))
     np.testing.assert_allclose(
         numbers(page.inner_text("#tip")), np.degrees((beta, omega, alpha)), atol=1e-2
@@ -246,7 +246,7 @@ def test_that_a_page_may_open_in_degrees(
     drawn = kc.page(example_named("four_bar").model, angle_unit="deg")
     page = open_file(drawn.write(tmp_path / "degrees.html"))
     assert page.evaluate("plots.list[0].labels[1]") == "phi_rocker [deg]"
-    assert page.inner_text("#angles") == "rad"
+    assert page.get_attribute("#angles", "aria-pressed") == "true"
     page.close()
 
 
@@ -265,7 +265,7 @@ def test_that_angles_among_parameters_are_typed_and_measured_in_degrees(open_pag
     page.wait_for_function("Math.abs(player.state.q[2] - Math.PI / 2) < 1e-9")
     page.get_by_role("tab", name="Measures").click()
     shown = page.locator("#panel-measures tr").all_inner_texts()
-    assert shown[0].split() == ["lean", "[deg]"]
+    assert page.locator("#panel-measures caption").first.inner_text() == "lean [deg]"
     greatest = next(line for line in shown if line.startswith("max"))
     assert float(greatest.split()[1]) == pytest.approx(90 + np.degrees(np.sin(1)), abs=1e-3)
     page.close()
@@ -335,10 +335,10 @@ def test_that_what_is_shown_is_saved(open_page: Any, tmp_path: Path) -> None:
 def test_that_the_page_fills_the_screen_with_large_type(open_page: Any) -> None:
     page = open_page("wrecker_boom")
     size = "parseFloat(getComputedStyle(document.body).fontSize)"
-    before, height = page.evaluate(size), page.evaluate("stage.height")
+    before = page.evaluate(size)
     page.keyboard.press("f")
     page.wait_for_function(f"{size} > {before}")
-    assert page.evaluate("stage.height") >= height
+    assert page.evaluate("stage.height > 0.7 * innerHeight")
     assert page.locator("#keys").is_hidden()
     assert page.evaluate(OVERFLOW) <= page.evaluate("innerWidth")
     page.keyboard.press("f")

@@ -451,10 +451,10 @@ def test_that_sliders_fit_and_can_be_touched(
     page = open_page(name, width)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     heights = page.evaluate(
-        "[...document.querySelectorAll('#live input[type=range], #live button')]"
+        "[...document.querySelectorAll('#live :is(input, button)')]"
         ".map(element => element.getBoundingClientRect().height)"
     )
-    assert min(heights) >= 44
+    assert min(heights) >= (44 if width == 390 else 24)
     names = page.evaluate(
         "[...document.querySelectorAll('#live input')]"
         ".map(element => element.ariaLabel || element.labels[0]?.textContent || '')"

@@ -474,6 +474,6 @@ def test_that_named_points_are_traced_and_outputs_are_plotted_first(open_page):
     for k, name in enumerate(shown):
         drawn = page.evaluate(f"plots.list[{k}].y")
         np.testing.assert_allclose(drawn, solution[name], atol=1e-12)
-    labels = page.evaluate("[...plots.list[0].choice.options].map(option => option.label)")
+    labels = page.evaluate("[...plots.list[0].choice.options].map(option => option.value)")
     assert {"height", "height_dot", "still", "x_rod", "path of P", "|v| of Q"} <= set(labels)
     assert page.said == []
