@@ -25,8 +25,9 @@ from kincompile.errors import InternalError, KincompileError
 from kincompile.names import escaped_lines
 
 COMMANDS = (
-    "assemblies", "compare", "compile", "derive", "draw", "equilibrium", "exercise", "fit",
-    "inspect", "mark", "run", "schema", "simulate", "sweep", "tolerance", "transmission", "view",
+    "assemblies", "compare", "compile", "convert", "derive", "draw", "equilibrium", "exercise",
+    "fit", "inspect", "mark", "run", "schema", "simulate", "sweep", "tolerance", "transmission",
+    "view",
 )  # fmt: skip
 """The commands: each is the `command` of the file of its name."""
 
@@ -94,9 +95,10 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 def cli() -> None:
     """Compile mechanisms, in the plane and in space, to numerical code, and run it.
 
-    MODEL is a data file (.toml, .json, or .adm of simEngine2D), or a Python file with one Mechanism
-    or ConstraintSystem at module level; of several, the one called mechanism, system or m. A data
-    file never runs code. A Python file is run: use only what you trust.
+    MODEL is a data file (.toml, .json, a robot as .urdf or MJCF, or .adm of simEngine2D), or a
+    Python file with one Mechanism or ConstraintSystem at module level; of several, the one called
+    mechanism, system or m. A data file never runs code. A Python file is run: use only what you
+    trust.
     """
 
 

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
 import kincompile as kc
 from kincompile.cli import shared
 from kincompile.cli.motion import set_values
-from kincompile.errors import InputError
 from kincompile.model.tasks import Fit
-from kincompile.writing import write_atomically
-
-ENDINGS = (".toml", ".json")
 
 
 @click.command("fit")
@@ -43,17 +37,14 @@ def command(
     from kincompile.design.variation import require_mechanism
 
     if output is not None:
-        if Path(output).suffix not in ENDINGS:
-            raise InputError(f"cannot write {output}: end its name in .toml or .json")
-        shared.require_output(output, model, "the model itself")
+        shared.require_model_output(output, model)
     mechanism = require_mechanism(shared.read_model(model), "kincompile fit")
     given = read_fit(model, mechanism)
     given |= {name: x for name, x in options.items() if x is not None}
     found = kc.fit(mechanism, p=set_values(mechanism, values), **given)
     shared.print_data(f"{found}\n")
     if output is not None:
-        text = found.model.to_json() if output.endswith(".json") else found.model.to_toml()
-        click.echo(f"Wrote {write_atomically(output, text)}", err=True)
+        shared.write_model(output, found.model)
     if page is not None:
         shared.write_page(page, fit_page(found))
     if not found.success:

@@ -49,6 +49,19 @@ def require_output(path: str | Path, read: str, what: str) -> None:
         raise InputError(f"{path} is {what}; give another name to write to")
 
 
+def require_model_output(path: str, read: str) -> None:
+    """Refuse a model file of another ending, or that is the model which is read."""
+    if Path(path).suffix not in (".toml", ".json"):
+        raise InputError(f"cannot write {path}: end its name in .toml or .json")
+    require_output(path, read, "the model itself")
+
+
+def write_model(path: str, model: Mechanism | ConstraintSystem) -> None:
+    """Write a model file, and say so."""
+    text = model.to_json() if path.endswith(".json") else model.to_toml()
+    click.echo(f"Wrote {write_atomically(path, text)}", err=True)
+
+
 def output_option(text: str, *, required: bool = True) -> Callable[[Command], Command]:
     """Return the option ``-o FILE``."""
     return click.option("-o", "--output", required=required, metavar="FILE", help=text)

@@ -39,7 +39,7 @@ RUN = {
     "docs/forces.md": 5, "docs/dynamics.md": 7, "docs/sensitivities.md": 2,
     "docs/transmissions.md": 10, "docs/other_programs.md": 14, "docs/fmi.md": 8,
     "docs/on_a_controller.md": 4,
-    "docs/tolerances.md": 4, "docs/space.md": 5, "docs/synthesis.md": 10,
+    "docs/tolerances.md": 4, "docs/space.md": 5, "docs/robots.md": 3, "docs/synthesis.md": 10,
     "docs/sweeps.md": 9, "docs/stepper.md": 3, "docs/in_c.md": 15, "docs/in_javascript.md": 13,
     "docs/in_rust.md": 6, "docs/in_octave.md": 9,
     "docs/course/museum.md": 19, "docs/course/project.md": 7,

@@ -26,6 +26,8 @@ LEAST_STEP = 1e-3
 """Least step of that way, as a part of it."""
 STARTS = 12
 """Starts that are tried; the first is the pose itself, the others are beside it."""
+STEPS, WORK = 100, 60_000
+"""Steps from one start, and evaluations of a joint in all: a few seconds, then it is given up."""
 INDEPENDENT = 1e-7
 """What of a direction is left where it is independent of others."""
 
@@ -42,6 +44,7 @@ class Tree:
                 self.places[joint.name] = slice(size, size + joint.freedoms)
                 size += joint.freedoms
         self.size = size
+        self.left = WORK // max(size, 1)  # evaluations
         self._is_above = {
             link: self._mask(joint.name for joint in robot.above(link))
             for closure in robot.closures
@@ -78,6 +81,7 @@ class Tree:
 
     def rows(self, x: Array) -> tuple[Array, Array]:
         """Return the residuals of loops and couplings, and their derivatives by the values."""
+        self.left -= 1
         frames, turns, slides = self.frames(x)
         rows, slopes = [np.zeros(0)], [np.zeros((0, self.size))]
         for closure in self.robot.closures:
@@ -133,7 +137,7 @@ class Tree:
         if free.any() and self.rows(x)[0].size:
             done = least_squares(  # type: ignore[operator]
                 lambda y: self.rows(at(y))[0], x[free], lambda y: self.rows(at(y))[1][:, free],
-                bounds, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=300,
+                bounds, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=self._steps(),
             )  # fmt: skip
             x = at(done.x)
             for _ in range(3):  # Newton's method leaves rounding errors alone
@@ -142,6 +146,10 @@ class Tree:
                 if np.abs(step).max() < 1e-2:
                     x = _put(x, free, x[free] - step)
         return x
+
+    def _steps(self) -> int:
+        """Return how many steps may be made, of two evaluations each."""
+        return max(1, min(STEPS, self.left // 2))
 
     def missed(self, x: Array) -> float:
         """Return the largest residual."""
@@ -175,6 +183,8 @@ def start_of(tree: Tree, x: Array, *, is_given: bool) -> tuple[Array, list[str]]
     for number in range(STARTS):
         begin = x + 0.05 * number * rng.standard_normal(tree.size)
         for bounds in (None,) if is_given else (None, limits):
+            if tree.left <= 0:
+                break
             found = tree.closed(begin, every, bounds)
             if tree.missed(found) > CLOSED:
                 continue
@@ -195,7 +205,7 @@ def led(tree: Tree, x: Array, wanted: Mapping[str, float]) -> tuple[Array, float
         free[tree.places[name]] = False
         goal[tree.places[name]] = value
     first, done, step = x, 0.0, 1.0
-    while done < 1 and step > LEAST_STEP:
+    while done < 1 and step > LEAST_STEP and tree.left > 0:
         part = min(1.0, done + step)
         found = tree.closed(np.where(free, x, first + part * (goal - first)), free)
         if tree.missed(found) < CLOSED and np.abs(found - x).max() < NEAR:

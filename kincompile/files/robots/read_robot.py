@@ -11,11 +11,12 @@ import numpy as np
 from kincompile.errors import InputError, ModelError
 from kincompile.files.content import file_content
 from kincompile.files.robots.closing import CLOSED, Tree, led, start_of
+from kincompile.files.robots.mjcf import read_mjcf
 from kincompile.files.robots.sidecar import read_sidecar
 from kincompile.files.robots.to_mechanism import mechanism_of
 from kincompile.files.robots.urdf import read_urdf
 from kincompile.files.robots.xml_text import read_xml
-from kincompile.names import listed, shown, suggestion
+from kincompile.names import escaped, listed, shown, suggestion
 
 if TYPE_CHECKING:
     import os
@@ -57,7 +58,14 @@ def read_robot(
     ModelError
         If the files are no robot, or its loops cannot be closed.
     """
-    robot = read_urdf(path, read_xml(path, content))
+    root = read_xml(path, content)
+    if root.tag == "mujoco":
+        if loops is not None:
+            raise InputError(
+                f"{escaped(path)} is MJCF, whose loops are in <equality>: leave out the sidecar"
+            )
+        return assembled(read_mjcf(path, root), motors, pose)
+    robot = read_urdf(path, root)
     beside = path.with_suffix(".yaml")
     if loops is None and not robot.closures and beside.is_file():
         loops = beside

@@ -166,7 +166,7 @@ def order_tree(robot: Robot, reader: XmlReader) -> None:
     ordered: dict[str, Joint] = {}
     waiting = roots[:1]
     while waiting:
-        for joint in below.get(waiting.pop(), ()):
+        for joint in below.get(waiting.pop(0), ()):
             if joint.name not in ordered:
                 ordered[joint.name] = joint
                 waiting.append(joint.child)

@@ -55,9 +55,15 @@ class _Builder:
         self._host: dict[str, tuple[str, Array]] = {}
         for joint in ({robot.root: None} | robot.parents).items():
             self._find_host(*joint)
-        bodies = dict.fromkeys(body for body, _ in self._host.values())
-        self._names = legal_names([x for x in bodies if x != robot.root], {"ground"})
-        self._joint_names = legal_names(robot.joints, self._taken())
+        bodies = [link for link in robot.links if self._host[link][0] == link != robot.root]
+        parents = {joint.parent for joint in robot.joints.values()}
+        closed = {link for closure in robot.closures for link in closure.links}
+        inner = parents | closed | {*bodies, robot.root}
+        self._tips = [
+            link for link in robot.links if link not in inner and self._host[link][0] != robot.root
+        ]
+        self._names = legal_names([*bodies, *self._tips], {"ground"})
+        self._joint_names = legal_names(tree.places, self._taken())
         self._parameters: dict[str, Any] = {}
         self._measured: dict[str, Any] = {}
         self._bodies: dict[str, Any] = {robot.root: self._made.ground}
@@ -84,6 +90,8 @@ class _Builder:
         frames, *_ = self._tree.frames(self._x)
         masses = self._masses()
         for link, name in self._names.items():
+            if link in self._tips:
+                continue
             place = frames[link]
             p, _ = euler_parameters(place[:3, :3], None, None, {})
             mass = masses.get(link)
@@ -96,10 +104,12 @@ class _Builder:
             self._drive(name)
         for closure in robot.closures:
             (i, a), (j, b) = map(self._side, closure.links, closure.at)
-            name = legal_names([closure.name], self._used())[closure.name]
-            made.add(_constraint(closure.kind, name, i, a, j, b, closure.axes))
+            made.add(_constraint(closure.kind, self._free(closure.name), i, a, j, b, closure.axes))
         for coupling in robot.couplings:
             self._couple(coupling)
+        for link in self._tips:
+            body, place = self._side(link, np.eye(4))
+            made.point(self._names[link], body, _point(place))
         made.links = {
             link: ("ground" if body == robot.root else self._names[body], place)
             for link, (body, place) in self._host.items()
@@ -116,8 +126,10 @@ class _Builder:
                 listed(changed, 20),
             )  # fmt: skip
 
-    def _used(self) -> set[str]:
-        return {item.name for item in self._made.constraints}
+    def _free(self, name: str) -> str:
+        """Return a name for a constraint that neither joints nor other constraints have."""
+        used = {item.name for item in self._made.constraints} | {*self._joint_names.values()}
+        return legal_names([name], used)[name]
 
     def _side(self, link: str, at: Array) -> tuple[SpatialBody, Array]:
         body, place = self._host[link]
@@ -143,12 +155,15 @@ class _Builder:
         i, a = self._side(joint.parent, joint.at)
         j, b = self._side(joint.child, joint.on)
         axes = (joint.axes[0], joint.axes[-1]) if joint.axes else (np.eye(3)[2],) * 2
-        return _constraint(joint.kind, self._joint_names[joint.name], i, a, j, b, axes)
+        name = self._joint_names[joint.name]
+        if joint.name in (self._robot.motors or ()):  # the driver has the joint's name
+            name = self._free(f"{name}_joint")
+        return _constraint(joint.kind, name, i, a, j, b, axes)
 
     def _drive(self, name: str) -> None:
         joint = self._robot.joints[name]
         unit = "rad" if joint.kind == "revolute" else "m"
-        value = float(self._x[self._tree.places[name]][0]) + joint.reference
+        (value,) = _tidy(self._x[self._tree.places[name]] + joint.reference)
         low, high = joint.limits or (0.0, 0.0)
         if not low < high:
             low, high = value - SLIDER, value + SLIDER
@@ -156,7 +171,7 @@ class _Builder:
         legal = self._joint_names[name]
         parameter = self._made.parameter(legal, value, unit, limits)
         self._parameters[name] = parameter
-        self._made.add(self._driver(joint, f"drive_{legal}", parameter - joint.reference))
+        self._made.add(self._driver(joint, legal, parameter - joint.reference))
 
     def _driver(self, joint: Joint, name: str, value: Any) -> Constraint:
         """Return the driver that gives a hinge or a slide a value, less its reference."""
@@ -169,7 +184,7 @@ class _Builder:
 
     def _couple(self, coupling: Coupling) -> None:
         """Add the equation of a coupling, or a driver where it follows motors alone."""
-        name = legal_names([coupling.name], self._used())[coupling.name]
+        name = self._free(coupling.name)
         (first, factor), *more = coupling.left.items()
         if not more and factor == 1 and all(x in self._parameters for x in coupling.right):
             value = _polynomial(coupling.polynomial, self._sum(coupling.right))
@@ -197,7 +212,7 @@ class _Builder:
                     ((q - p) * u for (q, p), u in zip(way, along, strict=True)), sympy.S.Zero
                 )
             else:
-                own = legal_names([f"angle_{name}"], self._used())[f"angle_{name}"]
+                own = self._free(f"angle_{name}")
                 sides = i, *_triad(a, axis), j, *_triad(b, axis)
                 angle = JointAngle(own, *sides, guess=float(found))
                 self._measured[name] = self._made.add(angle).theta

@@ -87,6 +87,7 @@ NOT_LOADED = {
         f"{LARGE} {RANK} rich platformdirs matplotlib kincompile.emitters.c "
         "kincompile.verification kincompile.checker"
     ),
+    "convert MODEL -o TASK": f"{PAGES} {EXTRA} {EMITTING} kincompile.runtime",
     "schema": f"{PAGES} {EXTRA} {EMITTING} kincompile.runtime",
 }
 

@@ -32,7 +32,43 @@ def doubled(formula: str, count: int = 22, last: str = "gamma = [a{k}, 0, 0]") -
     return "\n".join([*lines, last.format(k=count - 1)])
 
 
+def chain(count: int, kind: str = "revolute", loop: str = "") -> str:
+    """Return a robot of links in a row."""
+    links = "".join(f'<link name="l{k}"/>' for k in range(count + 1))
+    joints = "".join(
+        f'<joint name="j{k}" type="{kind}"><parent link="l{k}"/><child link="l{k + 1}"/>'
+        '<origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint>'
+        for k in range(count)
+    )
+    return f"<robot>{links}{joints}{loop}</robot>"
+
+
+FAR = (
+    '<loop type="fixed"><predecessor link="l0"><origin xyz="1000 0 0"/></predecessor>'
+    '<successor link="l290"/></loop>'
+)
+
 MODELS: dict[str, Case] = {
+    "XML bomb": ("urdf", lambda: '<!DOCTYPE a [<!ENTITY b "c">' + "".join(
+        f'<!ENTITY b{k} "&b{k - 1};&b{k - 1};">' for k in range(1, 99)) + "]><a>&b98;</a>",
+        "a document type"),
+    "XML entity": ("xml", lambda: '<!DOCTYPE a [<!ENTITY b SYSTEM "/dev/zero">]><a>&b;</a>',
+        "a document type"),
+    "deep XML": ("urdf", lambda: "<a>" * 10**6, "nested too deeply"),
+    "deep MJCF": ("xml", lambda: "<mujoco><worldbody>" + "<body>" * 10**5, "nested too deeply"),
+    "many elements": ("urdf", lambda: "<robot>" + "<a/>" * 10**6, "more than 100,000 elements"),
+    "many attributes": ("urdf", lambda: "<a " + " ".join(
+        f'a{k}=""' for k in range(500000)) + "/>", "more than 100,000 elements"),
+    "long number": ("urdf", lambda: chain(1).replace("1 0 0", "9" * 7 * 10**6), "give 3 numbers"),
+    "many numbers": ("urdf", lambda: chain(1).replace("1 0 0", "1 " * 10**6), "give 3 numbers"),
+    "long names": ("urdf", lambda: chain(3).replace("l1", "l" * 10**6), ""),
+    "many links of a robot": ("urdf", lambda: chain(10000, "fixed"), "at most 3000"),
+    "many joints": ("urdf", lambda: chain(301), "301 joints that move; at most 3000 and 300"),
+    "a chain that does not close": ("urdf", lambda: chain(290, loop=FAR), "cannot be closed"),
+    "a chain": ("urdf", lambda: chain(290), ""),
+    "a chain of MJCF": ("xml", lambda: "<mujoco><worldbody>" + '<body><joint name="{}"/>'.join(
+        [""] * 100) + "</body>" * 99 + "</worldbody></mujoco>", ""),
+    "XML bytes": ("urdf", lambda: "\0" * 10**6, "this is not XML"),
     "long links": ("toml", lambda: drawing(300, 30), ""),
     "many links": ("toml", lambda: drawing(50000, 2), "at most 300 parts"),
     "a long link": ("toml", lambda: drawing(1, 900), "at most 30 joints"),

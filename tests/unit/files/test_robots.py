@@ -6,15 +6,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
 import kincompile as kc
 from kincompile import spatial
+from kincompile.cli import cli
 
 DATA = Path(__file__).parents[2] / "data" / "robots"
-SMALL, LARGE = "5bar_linkage_iso3d", [
-    "5bar_linkage", "battobot_6d", "cassie_like", "digit_like", "wl16_like",
+SMALL, LARGE = ["5bar_linkage_iso3d", "welded_four_bar"], [
+    "5bar_linkage", "battobot_6d", "cassie_like", "digit_like", "wl16_like", "robotiq_2f85",
 ]  # fmt: skip
+WARNED = "ignore::kincompile.RedundantConstraintWarning"
 
 
 def oracle(name: str) -> dict[str, Any]:
@@ -23,9 +26,9 @@ def oracle(name: str) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
+@pytest.mark.filterwarnings(WARNED)
 @pytest.mark.parametrize(
-    "name", [SMALL, *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE)]
+    "name", [*SMALL, *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE)]
 )
 def test_that_frames_are_those_of_the_oracle(name: str) -> None:
     known = oracle(name)
@@ -45,3 +48,293 @@ def test_that_frames_are_those_of_the_oracle(name: str) -> None:
             if "p" in place:
                 expected = Rotation.from_quat(np.roll(place["p"], -1))
                 assert (turn[0] * expected.inv()).magnitude() < 1e-9, link
+
+
+LOOPS = {
+    "URDF+": '<loop name="c" type="{}"><predecessor link="{}"><origin xyz="0 0 0"/></predecessor>'
+    '<successor link="{}"/></loop>',
+    "the parser of URDF+": '<constraint name="c" type="{}"><predecessor link="{}"/>'
+    '<successor link="{}"/></constraint>',
+    "older files of URDF+": '<loop_constraint name="c" type="{}"><parent link="{}"/>'
+    '<parent_origin rpy="0 0 0"/><child link="{}"/></loop_constraint>',
+    "urdfdom": '<constraint name="c" type="{}"><parent link="{}"/><parent_origin xyz="0 0 0"/>'
+    '<child link="{}"/></constraint>',
+}
+
+
+@pytest.mark.parametrize("dialect", LOOPS)
+@pytest.mark.parametrize(
+    ("name", "kind", "links"),
+    [("5bar_linkage_iso3d", "spherical", ("closedloop3D_1A", "closedloop3D_1B")),
+     ("5bar_linkage", "fixed", ("sphere", "sphere_2"))],
+)  # fmt: skip
+def test_that_loops_in_the_file_are_those_of_the_sidecar(
+    tmp_path: Path, dialect: str, name: str, kind: str, links: tuple[str, str]
+) -> None:
+    text = (DATA / f"{name}.urdf").read_text()
+    path = tmp_path / "robot.urdf"
+    loop = LOOPS[dialect].format(kind, *links)
+    path.write_text(text.replace("</robot>", f"{loop}</robot>"))
+    motors = oracle(name)["motors"]
+    by_sidecar, by_loop = (
+        kc.read(DATA / f"{name}.urdf", motors=motors),
+        kc.read(path, motors=motors),
+    )
+    assert [x.default for x in by_loop.parameters] == [x.default for x in by_sidecar.parameters]
+    assert by_loop.system().equations != by_sidecar.system().equations  # c, not closure_1
+    assert len(by_loop.system().equations) == len(by_sidecar.system().equations)
+
+
+LINKS = '<link name="base"/><link name="a"/><link name="b"/>'
+HINGES = (
+    '<joint name="first" type="revolute"><parent link="base"/><child link="a"/>'
+    '<axis xyz="0 0 2"/><limit lower="-1" upper="1"/></joint>\n'
+    '<joint name="second" type="{}"><parent link="base"/><child link="b"/>'
+    '<origin xyz="1 0 0" rpy="0 0 0.5"/><axis xyz="0 0 1"/>{}</joint>\n'
+)
+TREE = f"<robot name='r'>{LINKS}\n{HINGES}</robot>"
+
+
+def model(tmp_path: Path, text: str, sidecar: str = "", **given: Any) -> Any:
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    if sidecar:
+        path.with_suffix(".yaml").write_text(sidecar)
+    return kc.read(path, **given)
+
+
+BELT = (
+    '<coupling name="belt"><predecessor link="a"/><successor link="b"/><ratio value="0.5"/>'
+    "</coupling></robot>"
+)
+
+
+@pytest.mark.parametrize("first", [0.25, -0.8])
+def test_that_a_mimic_joint_follows(tmp_path: Path, first: float) -> None:
+    mimic = '<mimic joint="first" multiplier="-2" offset="0.1"/>'
+    m = model(tmp_path, TREE.format("continuous", mimic))
+    assert [x.name for x in m.parameters] == ["first"]
+    solution = kc.solve(kc.compile(m), [0.0], {"first": first})
+    _, turn = spatial.frame(solution, "b")
+    assert turn[0].as_rotvec() == pytest.approx([0, 0, 0.5 - 2 * first + 0.1], abs=1e-12)
+
+
+def test_that_a_coupling_drives_backwards_over_turns(tmp_path: Path) -> None:
+    text = TREE.format("continuous", "").replace("</robot>", BELT)
+    m = model(tmp_path, text, motors=["second"], pose={"second": 7.5, "first": 15})
+    assert len(m.parameters) == 1
+    solution = kc.solve(kc.compile(m), [0.0], {"second": 7.6})
+    _, turn = spatial.frame(solution, "a")
+    assert turn[0].as_rotvec()[2] == pytest.approx(15.2 - 4 * np.pi, abs=1e-12)
+
+
+def test_that_a_coupling_follows_the_joints_from_the_common_ancestor(tmp_path: Path) -> None:
+    text = TREE.format("prismatic", '<limit lower="-1" upper="1"/>').replace("</robot>", BELT)
+    solution = kc.solve(kc.compile(model(tmp_path, text, motors=["first"])), [0.0], {"first": 0.6})
+    origin, _ = spatial.frame(solution, "b")
+    assert origin[0] == pytest.approx([1, 0, 0.3], abs=1e-12)
+
+
+FOUR_BAR = """<robot name="4 bar">
+<link name="base"/><link name="crank"/><link name="rod/1"/><link name="rocker"/>
+<joint name="crank" type="revolute"><parent link="base"/><child link="crank"/><axis xyz="0 0 1"/>
+<limit lower="{}" upper="{}"/></joint>
+<joint name="knee" type="continuous"><parent link="crank"/><child link="rod/1"/>
+<origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint>
+<joint name="rocker" type="revolute"><parent link="base"/><child link="rocker"/>
+<origin xyz="4 0 0"/><axis xyz="0 0 1"/><limit lower="{}" upper="{}"/></joint>
+<loop name="pin" type="revolute"><predecessor link="rod/1"><origin xyz="3.5 0 0"/></predecessor>
+<successor link="rocker"><origin xyz="3 0 0"/></successor><axis xyz="0 0 1"/></loop></robot>"""
+
+
+def rocker_angles(crank: float) -> list[float]:
+    """Return both angles of the rocker of the four-bar 1, 3.5, 3, 4, by the law of cosines."""
+    d = 4 - np.exp(1j * crank)
+    beside = np.arccos((9 + abs(d) ** 2 - 3.5**2) / (2 * 3 * abs(d)))
+    return [float(np.angle(-d * np.exp(sign * 1j * beside))) for sign in (1, -1)]
+
+
+def drawn_angle(m: spatial.Mechanism, link: str) -> float:
+    """Return the angle about z of a link in the guess of a mechanism."""
+    body = next(x for x in m.bodies if x.name == m.links[link][0])
+    turn = Rotation.from_quat(np.roll([float(x) for x in body.guess[3:]], -1))
+    return float(turn.as_rotvec()[2])
+
+
+@pytest.mark.filterwarnings(WARNED)
+@pytest.mark.parametrize(("limits", "which"), [((0.1, 3), 1), ((-3, -0.1), 0)])
+def test_that_limits_choose_among_assemblies(
+    tmp_path: Path, limits: tuple[float, float], which: int
+) -> None:
+    m = model(tmp_path, FOUR_BAR.format(-2, 2, *limits), motors=["crank"])
+    expected = rocker_angles(m.parameters[0].default)[which]
+    assert drawn_angle(m, "rocker") == pytest.approx(expected, abs=1e-9)
+    assert limits[0] < expected < limits[1]
+
+
+@pytest.mark.filterwarnings(WARNED)
+def test_that_motors_are_led_to_the_pose_without_a_jump(tmp_path: Path) -> None:
+    text = FOUR_BAR.format(-9, 9, -4, 4)
+    m = model(tmp_path, text, motors=["crank"], pose={"crank": 2.9})
+    assert m.parameters[0].default == pytest.approx(2.9, abs=1e-12)
+    first = drawn_angle(m, "rocker")
+    branch = int(np.argmin(np.abs(np.array(rocker_angles(2.9)) - first)))
+    assert first == pytest.approx(rocker_angles(2.9)[branch], abs=1e-9)
+    solution = kc.solve(kc.compile(m), [0.0], {"crank": 3.6})
+    _, turn = spatial.frame(solution, "rocker")
+    assert turn[0].as_rotvec()[2] == pytest.approx(rocker_angles(3.6)[branch], abs=1e-9)
+    with pytest.raises(kc.ModelError, match="its motors cannot be led to the values of the pose"):
+        model(tmp_path, text, motors=["rocker"], pose={"rocker": 0.0, "knee": 1.0})
+
+
+def test_that_limits_that_are_left_and_changed_names_are_said(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    m = model(tmp_path, FOUR_BAR.format(-0.1, 0.1, 0.1, 0.2), motors=["crank"])
+    assert "beyond their limits are the joints" in caplog.text
+    assert "'rod/1' is rod_1" in caplog.text
+    assert "the joints were moved, most" in caplog.text
+    assert m.name == "n_4_bar"
+    assert {"rod/1", "base", "crank", "rocker"} == {*m.links}
+    assert m.parameters[0].range is None  # it begins beyond them
+
+
+def test_masses_of_links_that_a_fixed_joint_joins(tmp_path: Path) -> None:
+    """Two of 1 kg, their centres at 0.5 and at 1.5: each adds 0.25 kg m^2 about the centre at 1."""
+    half = (
+        '<inertial><origin xyz="0.5 0 0"/><mass value="1"/>'
+        '<inertia ixx="1e-3" iyy="2e-3" izz="2e-3"/></inertial></link>'
+    )
+    text = TREE.format("fixed", "").replace('<parent link="base"/><child link="b"/>',
+        '<parent link="a"/><child link="b"/>').replace(' rpy="0 0 0.5"', "").replace(
+        '<link name="a"/><link name="b"/>',
+        f'<link name="a">{half}<link name="b">{half}')  # fmt: skip
+    (body,) = model(tmp_path, text).bodies
+    assert body.mass == 2
+    assert body.centre == pytest.approx([1, 0, 0])
+    assert np.diag(body.inertia) == pytest.approx([2e-3, 0.504, 0.504])
+
+
+GOOD = TREE.format("continuous", "")
+TWICE = GOOD.replace('name="second"', 'name="first"')
+REFUSED = {
+    "bomb": ('<!DOCTYPE r [<!ENTITY a "b">]>' + GOOD, r"line 1: a document type"),
+    "external": ('<!DOCTYPE r SYSTEM "file:///etc/passwd"><r/>', r"line 1: a document type"),
+    "not XML": (GOOD.replace("</robot>", ""), r"line 4: this is not XML"),
+    "other root": ("<sdf/>", r"line 1: this is no URDF: it begins with <sdf>"),
+    "zero axis": (GOOD.replace("0 0 2", "0 0 0"), r"line 2: the axis is zero; give a direction"),
+    "NaN": (GOOD.replace("1 0 0", "nan 0 0"), r"line 3: xyz of <origin> .* is not a number"),
+    "huge": (GOOD.replace("1 0 0", "1e300 0 0"), r"line 3: xyz .* not a number of at most 1e\+09"),
+    "two numbers": (GOOD.replace("0 0 2", "0 2"), r"line 2: xyz of <axis> is '0 2': give 3 num"),
+    "two parents": (GOOD.replace('child link="b"', 'child link="a"'),
+                    r"line 3: link 'a' has two parents, by the joints 'first' and 'second'"),
+    "cycle": (GOOD.replace('parent link="base"', 'parent link="b"', 1).replace(
+        '<parent link="base"/><child link="b"/>', '<parent link="a"/><child link="b"/>'),
+        r"line \d: joint 'first' is part of a cycle"),
+    "no parent": (GOOD.replace('<link name="a"/>', '<link name="a"/><link name="c"/>'),
+                  r"the links 'base', 'c' have no parent"),
+    "missing link": (GOOD.replace('child link="a"', 'child link="bass"'),
+                     r"line 2: <joint> names the link 'bass', which is nowhere; .* 'base'"),
+    "twice": (TWICE, r"line 3: there are two joints 'first'; rename one"),
+    "floating": (TREE.format("floating", ""), r"line 3: joint 'second' has the type 'floating'"),
+    "limits": (GOOD.replace('lower="-1"', 'lower="2"'), r"line 2: .* its lower limit 2 is above"),
+    "mimic": (TREE.format("continuous", '<mimic joint="fist"/>'),
+              r"line 3: joint 'fist' is nowhere; did you mean 'first'"),
+    "loop": (GOOD.replace("</robot>", '<loop type="sphere"/></robot>'),
+             r"line 4: <loop> has the type 'sphere': .*did you mean 'spherical'"),
+    "xacro": (GOOD.replace("<link", "<xacro:macro/><link", 1),
+              r"line 1: this is a xacro file; expand it"),
+    "open": (GOOD.replace("</robot>", '<loop type="spherical"><predecessor link="a">'
+             '<origin xyz="9 0 0"/></predecessor><successor link="b"/></loop></robot>'),
+             r"its loops cannot be closed; from where it begins they miss by 8 \[m or rad\]"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_that_a_fault_is_named_with_its_line(tmp_path: Path, case: str) -> None:
+    text, message = REFUSED[case]
+    with pytest.raises(kc.ModelError, match=message) as caught:
+        model(tmp_path, text)
+    assert all("robot.urdf" in problem for problem in caught.value.problems)
+
+
+SIDECARS = {
+    "bomb": ("a: &a [x]\nb: [*a, *a]\n", r"line 2: aliases \(\*\) are not read"),
+    "code": ("closed_loop: !!python/object/apply:os.system [[a, b]]\ntype: [7d]\n",
+             r"line 2: type '7d' is no type of a loop: write 6d or 3d"),
+    "deep": ("closed_loop: " + "[" * 1000, r"line 1: the lists are nested too deeply"),
+    "types": ("closed_loop: [[a, b]]\ntype: [6d, 3d]\n", r"line 2: type has 2 entries for 1 pairs"),
+    "frame": ("closed_loop:\n- [a, secont]\ntype: [6d]\n",
+              r"line 2: frame 'secont' is nowhere in .*robot.urdf; did you mean 'second'"),
+    "motor": ("name_mot:\n- first\n- secnd\n", r"line 3: joint 'secnd' is nowhere .* 'second'"),
+    "itself": ("closed_loop: [[b, second]]\ntype: [6d]\n", r"line 1: .* joins 'b' to itself"),
+    "kind": ("joint_name: [first]\njoint_type: [UJOINT_XX]\n", r"line 2: joint 'first' has"),
+    "kinds": ("joint_name: [first]\n", r"line 1: joint_name has 1 names, joint_type 0 types"),
+    "text": ("closed_loop: a\n", r"line 1: closed_loop is no list"),
+    "not YAML": ("a: [", r"line 1: this is not YAML"),
+    "no table": ("- a\n", r"line 1: a sidecar has the keys closed_loop"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SIDECARS)
+def test_that_a_fault_of_a_sidecar_is_named_with_its_line(tmp_path: Path, case: str) -> None:
+    sidecar, message = SIDECARS[case]
+    with pytest.raises(kc.ModelError, match=f"robot.yaml, {message}"):
+        model(tmp_path, GOOD, sidecar)
+
+
+def test_what_is_said_of_motors(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    mimic = TREE.format("continuous", '<mimic joint="first"/>')
+    m = model(tmp_path, mimic, "name_mot: [first, second]\nclosed_loop: []\n")
+    assert [x.name for x in m.parameters] == ["first"]
+    assert "joints that mimic others are no motors: second are left out" in caplog.text
+    with pytest.raises(kc.InputError, match=r"motor 'thrd' is no joint of .* It has first, second"):
+        model(tmp_path, GOOD, motors=["thrd"])
+    with pytest.raises(kc.InputError, match=r"pose has 'firs', .* did you mean 'first'"):
+        model(tmp_path, GOOD, pose={"firs": 1})
+    with pytest.raises(kc.InputError, match="loops: only a robot"):
+        kc.read("m.toml", loops="a.yaml")
+    model(tmp_path, FOUR_BAR.format(-2, 2, -3, 3), motors=["crank", "rocker"])
+    assert "motors that follow from the others are left out: rocker" in caplog.text
+
+
+def test_that_a_robot_becomes_a_model_file(tmp_path: Path) -> None:
+    """And that the fixed end of a chain is a point, which a column is called by."""
+    tip = '<link name="tool-tip"/><joint name="f" type="fixed"><parent link="b"/>'
+    tip += '<child link="tool-tip"/><origin xyz="0 0.5 0"/></joint></robot>'
+    path, written = tmp_path / "robot.urdf", tmp_path / "robot.toml"
+    path.write_text(GOOD.replace("</robot>", tip))
+    done = CliRunner().invoke(cli, ["convert", str(path), "-o", str(written)])
+    assert done.exit_code == 0, done.output
+    solution = kc.solve(kc.compile(kc.read(written)), [0.0], {"second": 0.2})
+    place = [1 - 0.5 * np.sin(0.7), 0.5 * np.cos(0.7), 0]
+    assert [solution[f"tool_tip.{x}"][0] for x in "xyz"] == pytest.approx(place, abs=1e-12)
+    with pytest.raises(kc.InputError, match="r has no link 'tool-tip'; links are those of a file"):
+        spatial.frame(solution, "tool-tip")
+
+
+MJCF = (
+    '<mujoco><include file="{}"/><worldbody><body><inertial pos="0 0 0" mass="2" '
+    'diaginertia="1 1 1"/><joint name="j" axis="{}"/>{}</body></worldbody></mujoco>'
+)
+
+
+def test_mjcf_that_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    (tmp_path / "part.xml").write_text('<m><include file="other.xml"/></m>')
+    (tmp_path / "other.xml").write_text('<m><include file="part.xml"/></m>')
+    (tmp_path / "good.xml").write_text('<m><compiler angle="radian"/></m>')
+    bomb = '<replicate count="1000000000"><site/></replicate>'
+    for given, message in (
+        (("../secret.xml", "0 0 1", ""), r"line 1: the include '../secret.xml' is outside"),
+        (("part.xml", "0 0 1", ""), r"line 1: the include 'part.xml' includes itself"),
+        (("good.xml", "0 0 1", bomb), r"line 1: <replicate> is not read"),
+        (("good.xml", "0 0", ""), r"robot.xml, line 1: MuJoCo refuses this file: .*axis.*line 1"),
+    ):
+        path.write_text(MJCF.format(*given))
+        with pytest.raises(kc.ModelError, match=message):
+            kc.read(path)
+    path.write_text(MJCF.format("good.xml", "0 0 1", ""))
+    assert kc.read(path).bodies[0].mass == 2
+    with pytest.raises(kc.InputError, match="loops are in <equality>"):
+        kc.read(path, loops="a.yaml")
