@@ -26,12 +26,15 @@ LETTERS = {lookup(f"GREEK SMALL LETTER {name}"): f"\\{name}" for name in GREEK} 
     "·": r"\cdot", "°": r"{}^\circ", "√": r"\surd", "≥": r"\ge", "≤": r"\le", "≠": r"\ne",
 }  # fmt: skip
 DOTTED = {"\u0307": r"\dot", "\u0308": r"\ddot"}
+INDEX = re.compile(r"(?<![A-Za-z])(\w|\)|\})\\_([A-Za-z]+)\b")
+"""A letter or a bracket with an index, in prose that is LaTeX."""
 
 SMALL = "\\begingroup\\scriptsize\n\\begin{verbatim}\n"
 
 PREAMBLE = r"""\documentclass[10pt,aspectratio=169]{beamer}
 \usepackage[utf8]{inputenc}
 \usepackage{amsmath}
+\let\phi\varphi
 \setlength{\unitlength}{1bp}
 \setbeamertemplate{navigation symbols}{}
 \setbeamertemplate{footline}[frame number]
@@ -120,7 +123,7 @@ class _Printer:
         found = ""
         for token in children:
             if token.type == "text":
-                found += prose(token.content)
+                found += INDEX.sub(r"\1\\textsubscript{\2}", prose(token.content))
             elif token.type == "code_inline":
                 found += rf"\texttt{{{prose(token.content)}}}"
             else:

@@ -7,14 +7,21 @@ import re
 from base64 import b64encode
 from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from latex2mathml.converter import convert
 from markdown_it import MarkdownIt
+from markdown_it.common.utils import escapeHtml
 
 import kincompile as kc
 from docs.builders import beamer, lessons, notebooks
+from docs.builders.formulas import as_mathml
 from docs.builders.lessons import Lesson
 from docs.builders.places import DOCS, ROOT, write
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from markdown_it.token import Token
 
 PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -31,6 +38,11 @@ PAGE = """<!DOCTYPE html>
 </body>
 </html>
 """
+
+
+LIVE = """<iframe src="live.html" title="The mechanism, live"></iframe>
+<p class="paper">The mechanism in motion: open live.html.</p>"""
+"""The mechanism on a screen, and what stands there on paper."""
 
 
 def make(arguments: list[str]) -> None:
@@ -86,20 +98,25 @@ def slides(lesson: Lesson) -> str:
 
 def _as_html(text: str) -> str:
     """Return Markdown of docs/course as a part of a page that stands alone."""
-    live = '<iframe src="live.html" title="The mechanism, live"></iframe>'
-    text = lessons.LIVE.sub(live, text)
+    text = lessons.LIVE.sub(LIVE, text)
     text = lessons.MATH.sub(_formula, text)
     text = re.sub(r"^<!-- (?:file|excerpt): (\S+) -->$", r"`\1`", text, flags=re.MULTILINE)
     text = re.sub(r"^<!-- .*? -->\n", "", text, flags=re.MULTILINE)
     text = re.sub(r"!\[(.*?)\]\(\.\./(images/\S+)\)", _image, text)
     text = re.sub(r"\]\((\w+)\.md\)", r"](../\1/page.html)", text)
     text = re.sub(r"\[([^\]]*)\]\([^)]*\.md[^)]*\)", r"\1", text)  # the documentation stays behind
-    return str(MarkdownIt("commonmark", {"html": True}).enable("table").render(text))
+    reader = MarkdownIt("commonmark", {"html": True}).enable("table")
+    reader.add_render_rule("text", _prose)
+    return str(reader.render(text))
+
+
+def _prose(_: Any, tokens: Sequence[Token], index: int, *given: object) -> str:
+    """Return plain text; r_i has an index."""
+    return lessons.INDEX.sub(r"\1<sub>\2</sub>", str(escapeHtml(tokens[index].content)))
 
 
 def _formula(match: re.Match[str]) -> str:
-    shown = convert(match[1].strip(), display="block").replace("\n", " ")
-    return f'<div class="math">{shown}</div>'
+    return f'<div class="math">{as_mathml(match[1], "block")}</div>'
 
 
 def _filled(title: str, body: str) -> str:

@@ -38,6 +38,8 @@ STATED = re.compile(
     r"^<!-- (formula|mistake): (\w+) ?([^\n]*?) ?-->\n```math\n(.*?)^```$", re.MULTILINE | re.DOTALL
 )
 SYLLABUS = "<!-- syllabus -->"
+INDEX = re.compile(r"(?<![^\W_])([^\W\d_][\u0307\u0308]?|\))_([A-Za-z]+)\b")
+"""A letter or a bracket with an index, in prose: r_i, but not phi_crank."""
 
 
 @dataclass(frozen=True, slots=True)

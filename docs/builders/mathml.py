@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from docutils.nodes import SkipNode
-from latex2mathml.converter import convert
+
+from docs.builders.formulas import as_mathml
 
 if TYPE_CHECKING:
     from docutils.nodes import Element
@@ -20,10 +21,10 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 def _inline(self: HTML5Translator, node: Element) -> None:
-    self.body.append(convert(node.astext()))
+    self.body.append(as_mathml(node.astext()))
     raise SkipNode
 
 
 def _display(self: HTML5Translator, node: Element) -> None:
-    self.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>')
+    self.body.append(f'<div class="math">{as_mathml(node.astext(), "block")}</div>')
     raise SkipNode

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from random import Random
 from typing import TYPE_CHECKING
 
@@ -34,8 +35,30 @@ if TYPE_CHECKING:
 SHOWN = 5
 """Significant digits of the state on a sheet: two more than those of an answer."""
 
+ZERO = 12
+"""Decimals of a state behind which there is rounding alone."""
+
 LOUD = 3
 """A state is drawn from this part of the motion, in which no entry is near zero."""
+
+SMALLEST = 1e-9
+"""An entry that is smaller all the way is zero wherever the constraints hold: it is no question."""
+
+
+def choose_questions(variant: Mechanism, blanks: Sequence[Blank]) -> tuple[Blank, ...]:
+    """Return the blanks that have a value other than zero in the motion, numbered anew."""
+    reference, states = _motion(variant)
+    sizes = np.max(np.abs(_values(reference, blanks, states)), axis=0)
+    asked = (item for item, size in zip(blanks, sizes, strict=True) if size > SMALLEST)
+    return tuple(replace(item, name=f"B{k}") for k, item in enumerate(asked, 1))
+
+
+def _motion(variant: Mechanism) -> tuple[Reference, States]:
+    """Return a variant as marking knows it, with the states of its motion."""
+    reference = Reference(variant.system())
+    found = solve(compile_model(variant), np.linspace(0.0, variant.end, STEPS))
+    p = np.tile(reference.defaults, (STEPS, 1))
+    return reference, States(found.q, found.q_dot, found.t, p, np.zeros(STEPS, dtype=int))
 
 
 def choose_state(variant: Mechanism, blanks: Sequence[Blank], seed: str) -> tuple[State, list[str]]:
@@ -44,19 +67,16 @@ def choose_state(variant: Mechanism, blanks: Sequence[Blank], seed: str) -> tupl
     It is drawn from the third of the motion in which the smallest entry, compared with the largest
     value that it takes, is largest: digits of what cancels say nothing.
     """
-    system = variant.system()
-    reference = Reference(system)
-    found = solve(compile_model(variant), np.linspace(0.0, variant.end, STEPS))
-    shown = np.vectorize(lambda x: float(f"{x:.{SHOWN}g}"))
+    reference, found = _motion(variant)
+    shown = np.vectorize(lambda x: float(f"{round(x, ZERO):.{SHOWN}g}") + 0.0)  # no -0
     q, q_dot, t = (shown(item) for item in (found.q, found.q_dot, found.t))
-    p = np.tile(reference.defaults, (len(t), 1))
-    states = States(q, q_dot, t, p, np.zeros(len(t), dtype=int))
+    states = replace(found, q=q, q_dot=q_dot, t=t)
     values = _values(reference, blanks, states)
     sizes = np.abs(values)
     loudness = np.min(sizes / np.max(sizes, axis=0), axis=1)
     chosen = np.argsort(-loudness, kind="stable")[: max(1, len(t) // LOUD)]
     k = int(Random(f"exam-{seed}").choice(chosen.tolist()))
-    names = [item.name for item in system.coordinates]
+    names = reference.coordinates
     state = dict(zip(names, q[k].tolist(), strict=True))
     state |= dict(zip(map(rate, names), q_dot[k].tolist(), strict=True)) | {"t": float(t[k])}
     return state, [f"{value:#.{DIGITS}g}" for value in values[k]]

@@ -14,6 +14,7 @@ from kincompile.exercises.variants import Choices, variants
 from kincompile.model.mechanism import Mechanism
 from kincompile.names import rate
 from kincompile.report.to_html import as_html
+from kincompile.report.to_latex import as_tex
 from kincompile.writing import write_folder
 
 if TYPE_CHECKING:
@@ -85,19 +86,21 @@ class ExerciseKit:
             folder = f"{STUDENTS}/{student}"
             page = pages[student] = sheet(system, blanks, slips, student, state)
             if state is None:
-                found[f"{folder}/exercise.html"] = as_html(page, "Exercise")
+                found[f"{folder}/exercise.html"] = as_html(page, "Exercise", "exercise")
                 found[f"{folder}/{HAND_IN}"] = self._hand_in(student, system, blanks)
             else:
-                found[f"{folder}/sheet.html"] = as_html(page, "Exam", "exam")
+                own_page = together(self.name, {student: page})
+                found[f"{folder}/sheet.html"] = as_html(own_page, "Exam", "exam sheets")
             found[f"{INSTRUCTOR}/{MODELS}/{student}.toml"] = system.to_toml()
         if self.states:
             page = together(self.name, pages)
             found[f"{STUDENTS}/sheets.html"] = as_html(page, "Exam", "exam sheets")
+            found[f"{STUDENTS}/sheets.tex"] = as_tex(page, "Exam", is_exam=True)
             names = [item.name for item in self.blanks[0]]
             lines = [",".join(("sheet", *names)), *(x + "," * len(names) for x in self.students)]
             found[ANSWERS] = "\n".join(lines) + "\n"
         page = solutions(self.name, systems, self.blanks, self.mistakes, self.students, self.values)
-        found[f"{INSTRUCTOR}/solutions.html"] = as_html(page, "Solutions of")
+        found[f"{INSTRUCTOR}/solutions.html"] = as_html(page, "Solutions of", "key")
         blanks_of = {
             student: [{**asdict(item), "question": _question(item, own, system)} for item in own]
             for student, own, system in zip(self.students, self.blanks, systems, strict=True)
@@ -220,6 +223,7 @@ def exercise(
         states: Any = ()
         if exam:
             sheets = import_module("kincompile.exercises.exam")  # it loads the checker
+            blanks = sheets.choose_questions(made[0], blanks)
             states = [
                 sheets.choose_state(x, blanks, f"{seed}-{k}") for k, x in enumerate(made, start=1)
             ]

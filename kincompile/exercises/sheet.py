@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 RULE_STEP, BLOCK_STEP, GAMMA_STEP = 2, 3, 5
 """Steps of a derivation, from 0, that hints are taken from."""
 
-LINE = "_" * 22
-"""Where a formula is written on paper."""
+BOX, LINE = doc.Box(), doc.Box(is_wide=True)
+"""Where a number and a formula are written on paper."""
 
 
 def sheet(
@@ -51,7 +51,7 @@ def sheet(
     constraints = doc.Chapter("given", ("The constraints",), (), given)
     if state is not None:
         parts = (_taker(), _mechanism(figures), constraints, _form(system, blanks, state))
-        summary = f"Sheet {student}. Fill the boxes."
+        summary = "Fill the boxes."
         return doc.Manuscript(system.name, summary, parts, names)
     parts = (
         _mechanism(figures),
@@ -68,7 +68,7 @@ def together(name: str, sheets: Mapping[str, doc.Manuscript]) -> doc.Manuscript:
     chapters = tuple(
         doc.Chapter(
             f"sheet-{student}",
-            (f"Sheet {student}",),
+            (f"Sheet {student}: ", doc.Verbatim(name)),
             (doc.text(page.summary),),
             tuple(_of_sheet(item, student) for item in page.sections),
         )
@@ -180,7 +180,7 @@ def _tasks(system: ConstraintSystem, blanks: Sequence[Blank]) -> doc.Chapter:
 
 def _taker() -> doc.Chapter:
     """Return the boxes for who takes the exam."""
-    boxes = doc.table(("name", "number", "date"), [("", "", "")])
+    boxes = doc.table(("name", "number", "date"), [(BOX, BOX, BOX)])
     return doc.Chapter("taker", ("Who takes the exam",), (boxes,))
 
 
@@ -198,7 +198,7 @@ def _form(system: ConstraintSystem, blanks: Sequence[Blank], state: State) -> do
         ", gamma is what stands on the right side of the acceleration equation.",
     )  # fmt: skip
     rows: list[tuple[doc.Run | doc.Runs, ...]] = [
-        (doc.Verbatim(item.name), doc.Math(_symbol(item, system)), "", "") for item in blanks
+        (doc.Verbatim(item.name), doc.Math(_symbol(item, system)), LINE, BOX) for item in blanks
     ]
     blocks = (
         note,
@@ -224,8 +224,8 @@ def _to_be_found(system: ConstraintSystem, mistakes: Sequence[Mistake]) -> doc.C
         ]
         shown = doc.table(("entry", "derivative", "as derived by hand"), rows)
         asked = doc.text(
-            doc.Verbatim(item.place.name), f": the wrong entry {LINE}   ",
-            doc.Verbatim(item.entry.name), f": what belongs there {LINE}",
+            doc.Verbatim(item.place.name), ": the wrong entry ", LINE, "   ",
+            doc.Verbatim(item.entry.name), ": what belongs there ", LINE,
         )  # fmt: skip
         names: doc.Runs = (
             f"{item.place.name}, {item.entry.name}: ",

@@ -32,6 +32,13 @@ class Math:
 
 
 @dataclass(frozen=True, slots=True)
+class Box:
+    """A box to be filled by hand, with a formula where it is wide."""
+
+    is_wide: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class CrossReference:
     """A reference to an anchor of the page."""
 
@@ -39,7 +46,7 @@ class CrossReference:
     content: Run
 
 
-Run: TypeAlias = str | Verbatim | Math | CrossReference
+Run: TypeAlias = str | Verbatim | Math | CrossReference | Box
 """A piece of a text; a plain string is prose."""
 
 Runs: TypeAlias = tuple[Run, ...]

@@ -55,7 +55,13 @@ class Renderer(ABC):
                 return self._math(formula)
             case doc.CrossReference():
                 return self._link(run)
+            case doc.Box(is_wide):
+                return self._box(is_wide)
         return self._prose(run)
+
+    def _box(self, is_wide: bool) -> str:
+        """Return a box to be filled by hand: a line, where a medium has no other."""
+        return "_" * (22 if is_wide else 11)
 
     @abstractmethod
     def heading(self, section: doc.Chapter, depth: int) -> Iterator[str]:

@@ -111,6 +111,9 @@ class _HtmlRenderer(Renderer):
     def _link(self, link: doc.CrossReference) -> str:
         return f'<a href="#{escape(link.anchor)}">{self.run(link.content)}</a>'
 
+    def _box(self, is_wide: bool) -> str:
+        return f'<span class="box{" wide-box" if is_wide else ""}"></span>'
+
     def _prose(self, text: str) -> str:
         return escape(text)
 

@@ -32,11 +32,12 @@ MOST_PARAGRAPHS = 5
 """Columns up to which lines in cells are broken; a wider table is shrunk instead."""
 
 
-def as_tex(document: Manuscript) -> str:
-    """Return a document as LaTeX."""
-    renderer = _LatexRenderer(document)
+def as_tex(document: Manuscript, title: str = "Derivation of", *, is_exam: bool = False) -> str:
+    """Return a document as LaTeX; of an exam each section begins a page, and heads its pages."""
+    renderer = _LatexRenderer(document, is_exam)
     data = {
-        "title": rf"Derivation of \texttt{{{escape(document.name)}}}",
+        "title": rf"{title} \texttt{{{escape(document.name)}}}",
+        "is_exam": is_exam,
         "summary": escape(document.summary),
         "body": "\n".join(line for item in document.sections for line in renderer.section(item, 0)),
     }
@@ -44,7 +45,8 @@ def as_tex(document: Manuscript) -> str:
 
 
 class _LatexRenderer(Renderer):
-    def __init__(self, document: Manuscript) -> None:
+    def __init__(self, document: Manuscript, is_exam: bool) -> None:
+        self._is_exam = is_exam
         self._printer = TexPrinter(document.abbreviations, is_breakable=True)
 
     def heading(self, section: Chapter, depth: int) -> Iterator[str]:
@@ -52,6 +54,8 @@ class _LatexRenderer(Renderer):
         plain = "".join(escape(_plain(run)) for run in section.title)
         heading = HEADINGS[min(depth, len(HEADINGS) - 1)]
         title = rf"\texorpdfstring{{{self.runs(section.title)}{level}}}{{{plain}}}"
+        if self._is_exam and 0 < depth < len(HEADINGS):
+            yield r"\together"
         yield rf"\{heading}{{{title}}}"
         yield _target(section.anchor)
 
@@ -87,7 +91,7 @@ class _LatexRenderer(Renderer):
         yield from _tabular(["", *header], rows)
 
     def _figure(self, picture: Picture) -> Iterator[str]:
-        yield rf"\fitted{{\begin{{picture}}({picture.width:.0f},{picture.height:.0f})%"
+        yield rf"\drawn{{\begin{{picture}}({picture.width:.0f},{picture.height:.0f})%"
         yield r"\put(0,0){\pdfliteral{q 1 J 1 j"
         yield from (_drawn(path) for path in picture.paths)
         yield "Q}}%"
@@ -106,6 +110,9 @@ class _LatexRenderer(Renderer):
 
     def _link(self, link: CrossReference) -> str:
         return _hyperlink(link.anchor, self.run(link.content))
+
+    def _box(self, is_wide: bool) -> str:
+        return rf"\fillin{{{64 if is_wide else 28}mm}}"
 
     def _prose(self, text: str) -> str:
         return escape(text)

@@ -4,6 +4,7 @@ import csv
 import math
 import re
 import shutil
+import subprocess
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,7 @@ def test_that_an_exam_has_sheets_a_key_and_a_table_to_fill(made: ExerciseKit, fo
     found = {str(item.relative_to(folder)) for item in folder.rglob("*.*")}
     sheets = {f"students/{k}/sheet.html" for k in ("01", "02", "03")}
     models = {f"instructor/models/{k}.toml" for k in ("01", "02", "03")}
-    rest = {"students/sheets.html", "instructor/solutions.html", "instructor/blanks.json"}
+    rest = {"students/sheets.html", "students/sheets.tex", "instructor/solutions.html", "instructor/blanks.json"}
     assert found == sheets | models | rest | {"answers.csv"}
     text = (folder / "answers.csv").read_text(encoding="utf-8")
     assert text == "sheet,B1,B2,B3,B4\n01,,,,\n02,,,,\n03,,,,\n"
@@ -75,14 +76,15 @@ def test_that_an_exam_has_sheets_a_key_and_a_table_to_fill(made: ExerciseKit, fo
     page = (folder / "students" / "sheets.html").read_text(encoding="utf-8")
     sheets_of = re.split(r'<section id="sheet-', page)[1:]
     parts = [text.split("-tasks")[-1] for text in sheets_of]
-    assert [text.count("<td></td>") for text in parts] == [8, 8, 8]  # boxes: formulas and values
+    boxes = [(text.count('"box wide-box"'), text.count('"box"')) for text in parts]
+    assert boxes == [(4, 4)] * 3  # formulas and values
     anchors = re.findall(r' id="([^"]+)"', page)
     assert len(anchors) == len(set(anchors)) > 9
 
 
 def test_that_the_key_has_the_values_and_sheets_have_none(made: ExerciseKit, folder: Path) -> None:
     key = (folder / "instructor" / "solutions.html").read_text(encoding="utf-8")
-    given = [item.read_text(encoding="utf-8") for item in (folder / "students").rglob("*.html")]
+    given = [item.read_text(encoding="utf-8") for item in (folder / "students").rglob("*.*")]
     for k in range(3):
         system = made.variants[k].system()
         values = by_hand(made, k)
@@ -90,7 +92,7 @@ def test_that_the_key_has_the_values_and_sheets_have_none(made: ExerciseKit, fol
         for x, text in zip(values, made.values[k], strict=True):
             assert text == f"{x:#.3g}"
             assert f"<td>{text}</td>" in key
-            assert not [page for page in given if f">{text}<" in page]
+            assert not [page for page in given if f">{text}<" in page or f"& {text} " in page]
         for item in made.blanks[k]:
             entry = str(item.answer(system.Phi_q, system.gamma))
             assert not [page for page in given if entry in page]
@@ -98,6 +100,39 @@ def test_that_the_key_has_the_values_and_sheets_have_none(made: ExerciseKit, fol
     assert len(formulas) == 12
     assert not [x for x in formulas for page in given if x in page]
     assert not [page for page in given if "Hint" in page]
+
+
+def test_that_an_exam_asks_for_nothing_that_is_zero_all_the_way() -> None:
+    m = kc.Mechanism("slide", end=2)
+    arm = m.body("arm", guess=(0.0, 0.0, 0.3))
+    block = m.body("block", guess=(1.0, 0.3, 0.3))
+    m.add(kc.Revolute("pin", m.ground, (0, 0), arm, (0, 0)))
+    m.add(kc.Translational("way", arm, (0, 0), (1, 0), block, (0, 0), (1, 0)))
+    m.add(kc.AbsoluteAngle("turn", arm, 0.3 + kc.t / 2))
+    m.add(kc.TranslationalDistance("feed", arm, (0, 0), (1, 0), block, (0, 0), 1 + kc.t**2))
+    asked = {(x.quantity, x.row) for x in kc.exercise(m, 1, 2).blanks[0]}
+    system = m.system()
+    parallel = system.equations.index("way.parallel")
+    assert ("gamma", parallel) in asked  # (w_j - w_i)^2 sin(phi_i - phi_j)
+    kit = kc.exercise(m, 2, 2, exam=True)
+    assert ("gamma", parallel) not in {(x.quantity, x.row) for x in kit.blanks[0]}
+    assert [x.name for x in kit.blanks[1]] == [f"B{k}" for k in range(1, len(kit.blanks[1]) + 1)]
+    assert all(float(value) for own in kit.values for value in own)
+    written = [f"{value:g}" for state in kit.states for value in state.values()]
+    assert not [x for x in written if x == "-0" or "e-" in x]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="pdflatex is not installed")
+def test_that_pdflatex_sets_the_sheets(folder: Path) -> None:
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "sheets.tex"]
+    place = folder / "students"
+    done = subprocess.run(command, cwd=place, capture_output=True, check=False, text=True)
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert "Overfull" not in done.stdout
+    text = (place / "sheets.tex").read_text(encoding="utf-8")
+    assert re.findall(r"\\section\{.*?\{Sheet (\d+): ", text) == ["01", "02", "03"]
+    assert text.count(r"\fillin{64mm}") == 12
 
 
 def test_that_the_same_seed_gives_the_same_sheets(made: ExerciseKit) -> None:
