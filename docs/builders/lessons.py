@@ -115,9 +115,14 @@ class Lesson:
     def stated(self) -> list[Stated]:
         """The formulas that it prints."""
         return [
-            Stated(kind, quantity, constraint, matrix[matrix.index(r"\begin") :])
+            Stated(kind, quantity, constraint, self._named(matrix[matrix.index(r"\begin") :]))
             for kind, quantity, constraint, matrix in STATED.findall(self.text)
         ]
+
+    def _named(self, matrix: str) -> str:
+        """Return a formula with the name of the place of contact, of which a lesson has one."""
+        names = [x.name for x in self.model.system().coordinates if x.name.startswith("alpha_")]
+        return matrix.replace(r"\alpha", names[0]) if names else matrix
 
 
 def sketches() -> dict[str, str]:
