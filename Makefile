@@ -154,7 +154,7 @@ pictures: $(DOCS_READY)
 
 course: $(DOCS_READY)
 	@rm -rf course
-	@$(BIN)/python -m docs.builders course course
+	@$(BIN)/python -m docs.builders course course --mistakes
 	@$(BIN)/python -m pip wheel -qq --disable-pip-version-check --no-deps --wheel-dir course .
 	@echo "The course begins at course/index.html"
 

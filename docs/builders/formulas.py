@@ -7,7 +7,9 @@ import re
 from latex2mathml.converter import convert
 
 SPACE = '<mspace width="0.17em"/>'
-FUNCTION = re.compile(r"(</m\w+>)?(<mi>(?:sin|cos|atan2|rank)</mi>)(?=(<m(?:i|n|sub|over|frac)\b)?)")
+FUNCTION = re.compile(
+    r"(</m\w+>)?(<mi>(?:sin|cos|atan2|rank)</mi>)(?=(<m(?:i|n|sub|over|frac)\b)?)"
+)
 """A function, the end of what it is multiplied by, and the beginning of an argument."""
 
 

@@ -68,7 +68,12 @@ def test_that_an_exam_has_sheets_a_key_and_a_table_to_fill(made: ExerciseKit, fo
     found = {str(item.relative_to(folder)) for item in folder.rglob("*.*")}
     sheets = {f"students/{k}/sheet.html" for k in ("01", "02", "03")}
     models = {f"instructor/models/{k}.toml" for k in ("01", "02", "03")}
-    rest = {"students/sheets.html", "students/sheets.tex", "instructor/solutions.html", "instructor/blanks.json"}
+    rest = {
+        "students/sheets.html",
+        "students/sheets.tex",
+        "instructor/solutions.html",
+        "instructor/blanks.json",
+    }
     assert found == sheets | models | rest | {"answers.csv"}
     text = (folder / "answers.csv").read_text(encoding="utf-8")
     assert text == "sheet,B1,B2,B3,B4\n01,,,,\n02,,,,\n03,,,,\n"
