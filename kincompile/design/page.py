@@ -50,43 +50,10 @@ def tolerance_page(found: ToleranceAnalysis) -> str:
         rows = table(TITLES, found.rows(column, at))
         chapters.append(Chapter(column, (column,), (*said, rows)))
     plots = "\n".join(
-        f"<h3>{column}</h3><p>{_bands(found, column)}\n{_tornado(found, column)}</p>"
-        for column in found.columns
+        f"<h3>{column}</h3><p>{found.plots_svg(column)}</p>" for column in found.columns
     )
     manuscript = Manuscript(found.name, found.headline(), tuple(chapters))
     return as_html(manuscript, "Tolerances of", after=plots)
-
-
-def _bands(found: ToleranceAnalysis, column: str) -> str:
-    """Return the plot of deviations over time: worst case, RSS, and of samples 99.73 %."""
-    (low, high), (mean, sigma) = found.worst(column), found.rss(column)
-    layers = [
-        Layer("band", found.t, low, high, "var(--quiet)", "worst case"),
-        Layer("band", found.t, mean - 3 * sigma, mean + 3 * sigma, name="RSS"),
-    ]
-    if found.drawn is not None and len(found.drawn.values):
-        least, most = found.quantiles(column)
-        colour = "var(--numeric)"
-        layers += [Layer("line", found.t, least, None, colour, "samples")]
-        layers += [Layer("line", found.t, most, None, colour)]
-    title = titled(f"deviation of {column}", found.units[column])
-    return plot_svg(f"{title} over time", "t [s]", title, layers)
-
-
-def _tornado(found: ToleranceAnalysis, column: str) -> str:
-    """Return the effect of each source as a bar, the greatest on top, when it deviates most."""
-    at, k = found.widest(column), found.columns.index(column)
-    low, high = found.low[at, k], found.high[at, k]
-    order = np.argsort(high - low, kind="stable").tolist()
-    layers = [
-        Layer("band", np.array([low[j], high[j]]), np.full(2, row - 0.4), np.full(2, row + 0.4))
-        for row, j in enumerate(order)
-    ]
-    parts = found.contributions(column)[at]
-    names = [f"{found.sources[j]} {parts[j]:.1f} %" for j in order]
-    title = f"{column} at t = {found.t[at]:.4g} s; per cent of the variance"
-    across = titled(f"deviation of {column}", found.units[column])
-    return plot_svg(title, across, title, layers, rows=names)
 
 
 def fit_page(found: Fit) -> str:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kincompile.errors import InputError, package_of_extra
-from kincompile.html import Shown, figure_html, table_html
+from kincompile.html import Shown, table_html
 from kincompile.names import column_name, listed, unknown
+from kincompile.report.plot import Layer, coloured, plot_svg
 from kincompile.runtime.results.columns import titled
 from kincompile.tables import counted, indented, table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from kincompile.runtime.results.solution import Solution
@@ -272,25 +271,48 @@ class ToleranceAnalysis(Shown):
         ax.grid(axis="x", alpha=0.3)
 
     def to_html(self) -> str:
-        """Return tables and, where matplotlib is installed, plots, as a part of a page."""
+        """Return tables and plots, as a part of a page."""
         parts = []
         for column in self.columns:
             at = self.widest(column)
             title = "; ".join(line.strip() for line in self.summary(column, at))
             parts.append(table_html(column, title, TITLES, self.rows(column, at)))
-            parts.append(self.plots_html(column))
+            parts.append(coloured(self.plots_svg(column)))
         return "\n".join(parts)
 
-    def plots_html(self, column: str) -> str:
-        """Return bands and tornado of a column as HTML; "" where matplotlib is not installed."""
-        drawing = partial(self._draw_both, column_name(column))
-        return figure_html(f"tolerances of {column}", (9.6, 3.4), drawing)
+    def plots_svg(self, column: str) -> str:
+        """Return the bands of a column over time, and the bars of its sources, as SVG."""
+        return f"{self._bands_svg(column)}\n{self._tornado_svg(column)}"
 
-    def _draw_both(self, column: str, figure: Figure) -> None:
-        """Draw bands and tornado side by side into an empty figure."""
-        left, right = figure.subplots(1, 2)
-        self._draw_bands(left, column)
-        self._draw_tornado(right, column, self.widest(column))
+    def _bands_svg(self, column: str) -> str:
+        """Return the plot of deviations over time: worst case, RSS, and of samples 99.73 %."""
+        (low, high), (mean, sigma) = self.worst(column), self.rss(column)
+        layers = [
+            Layer("band", self.t, low, high, "var(--quiet)", "worst case"),
+            Layer("band", self.t, mean - 3 * sigma, mean + 3 * sigma, name="RSS"),
+        ]
+        if self.drawn is not None and len(self.drawn.values):
+            least, most = self.quantiles(column)
+            colour = "var(--numeric)"
+            layers += [Layer("line", self.t, least, None, colour, "samples")]
+            layers += [Layer("line", self.t, most, None, colour)]
+        title = titled(f"deviation of {column}", self.units[column])
+        return plot_svg(f"{title} over time", "t [s]", title, layers)
+
+    def _tornado_svg(self, column: str) -> str:
+        """Return the effect of each source as a bar, the greatest on top, when it deviates most."""
+        at, k = self.widest(column), self._place(column)
+        low, high = self.low[at, k], self.high[at, k]
+        order = np.argsort(high - low, kind="stable").tolist()
+        layers = [
+            Layer("band", np.array([low[j], high[j]]), np.full(2, row - 0.4), np.full(2, row + 0.4))
+            for row, j in enumerate(order)
+        ]
+        parts = self.contributions(column)[at]
+        names = [f"{self.sources[j]} {parts[j]:.1f} %" for j in order]
+        title = f"{column} at t = {self.t[at]:.4g} s; per cent of the variance"
+        across = titled(f"deviation of {column}", self.units[column])
+        return plot_svg(title, across, title, layers, rows=names)
 
     def _repr_html_(self) -> str:
         return self.to_html()

@@ -26,6 +26,13 @@ TICKS = 5
 """About how many numbers stand along an axis."""
 
 
+COLOURS = {
+    "ink": "currentColor", "quiet": "#808a96", "line": "#80808066", "link": "#2a7de1",
+    "numeric": "#d2691e",
+}  # fmt: skip
+"""Of plots outside a page of ours, on light and on dark paper."""
+
+
 class Layer(NamedTuple):
     """What a plot shows, (N,) each; NaN interrupts a line."""
 
@@ -85,6 +92,12 @@ def plot_svg(
         "svg", "".join(inside), viewBox=f"0 0 {WIDTH} {HEIGHT}", width=WIDTH, height=HEIGHT,
         role="img", aria_label=title, font_size=11, style="max-width: 100%; height: auto",
     )  # fmt: skip
+
+
+def coloured(plots: str) -> str:
+    """Return plots with colours of their own, for a notebook."""
+    colours = "; ".join(f"--{name}: {colour}" for name, colour in COLOURS.items())
+    return f'<div style="{colours}">{plots}</div>'
 
 
 def _extent(values: Array) -> tuple[float, float]:

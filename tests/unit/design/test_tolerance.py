@@ -1,6 +1,7 @@
 """Tolerances against the closed form of the slider-crank, and against what they must obey."""
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -146,7 +147,11 @@ def test_report_names_the_greatest_contribution_first(slider_crank):
     rows = [line.split()[0] for line in lines[-4:]]
     assert rows == ["L", "theta", "e", "r"]
     assert "Monte Carlo" in found.to_html()
-    assert "<img" in found.to_html()
+    html = found.to_html()
+    assert "<img" not in html
+    assert html.count("<svg") == 2
+    used = set(re.findall(r"var\(--(\w+)\)", html))
+    assert used == set(re.findall(r"--(\w+): ", html))  # a notebook has none of our colours
 
 
 def test_plots_show_bands_and_bars(slider_crank):
