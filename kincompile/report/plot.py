@@ -25,6 +25,9 @@ LEFT, RIGHT, TOP, BOTTOM = 62, 12, 26, 40
 TICKS = 5
 """About how many numbers stand along an axis."""
 
+LETTER, GAP = 6.2, 12
+"""Width of a letter at most, and between texts."""
+
 
 COLOURS = {
     "ink": "currentColor", "quiet": "#808a96", "line": "#80808066", "link": "#2a7de1",
@@ -109,9 +112,9 @@ def _extent(values: Array) -> tuple[float, float]:
     return low - more, high + more
 
 
-def _ticks(low: float, high: float) -> list[tuple[float, str]]:
+def _ticks(low: float, high: float, most: int = TICKS) -> list[tuple[float, str]]:
     """Return round numbers along an axis, with their texts."""
-    rough = (high - low) / TICKS
+    rough = (high - low) / most
     power = 10.0 ** math.floor(math.log10(rough))
     step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= 0.7 * rough)
     first, last = math.ceil(low / step), math.floor(high / step)
@@ -121,6 +124,17 @@ def _ticks(low: float, high: float) -> list[tuple[float, str]]:
     return [(k * step, text.format(k * step)) for k in range(first, last + 1)]
 
 
+def _apart(low: float, high: float) -> list[tuple[float, str]]:
+    """Return the numbers of the axis across: as many as have room beside each other."""
+    wide, found = WIDTH - LEFT - RIGHT, _ticks(low, high)
+    for most in range(TICKS - 1, 0, -1):
+        needed = max((LETTER * len(text) + GAP / 2 for _, text in found), default=0.0)
+        if len(found) < 2 or wide * (found[1][0] - found[0][0]) / (high - low) >= needed:
+            break
+        found = _ticks(low, high, most)
+    return found
+
+
 def _axes(
     numbers: Sequence[tuple[float, float]],
     pair: Callable[[Iterable[float]], str],
@@ -128,7 +142,7 @@ def _axes(
 ) -> Iterator[str]:
     """Yield the lines of the grid, with their numbers; across only where there are no rows."""
     (x0, x1), (y0, y1) = numbers
-    for x, text in _ticks(x0, x1):
+    for x, text in _apart(x0, x1):
         yield element("path", d=outline([(x, y0), (x, y1)], False, pair), stroke="var(--line)")
         at = pair((x, y0)).split()[0]
         yield label(text, x=at, y=HEIGHT - 24, text_anchor="middle", fill="var(--quiet)")
@@ -165,6 +179,7 @@ def _drawn(item: Layer, pair: Callable[[Iterable[float]], str]) -> str:
 
 def _legend(layers: Sequence[Layer]) -> Iterator[str]:
     """Yield the names of layers, at the top right."""
-    named = [item for item in layers if item.name]
-    for k, item in enumerate(reversed(named)):
-        yield label(item.name, x=WIDTH - RIGHT - 90 * k, y=13, text_anchor="end", fill=item.colour)
+    right = float(WIDTH - RIGHT)
+    for item in reversed([item for item in layers if item.name]):
+        yield label(item.name, x=f"{right:.1f}", y=13, text_anchor="end", fill=item.colour)
+        right -= LETTER * len(item.name) + GAP

@@ -1,5 +1,6 @@
 """Plots as SVG: their elements, read by an XML parser, stand where the numbers are."""
 
+import itertools
 import re
 from xml.etree import ElementTree as ET
 
@@ -62,3 +63,24 @@ def test_that_nothing_and_one_value_can_be_plotted():
     read(Layer("line", X, np.full(11, np.nan)))
     _, up, _ = read(Layer("line", X, np.full(11, 5.0)))
     assert min(up) < 5 < max(up)
+
+
+@pytest.mark.parametrize("ends", [(-1.3e-4, 2.2e-4), (0.0, 12.0), (-987654.0, 0.0), (1e8, 4e8)])
+def test_that_no_numbers_and_names_meet(ends):
+    """With 6 units a letter, which is more than a digit of 11 units has."""
+    x = np.linspace(*ends, 5)
+    layers = [Layer("line", x, X[:5], name=name) for name in ("worst case", "RSS", "samples")]
+    across, _, _ = read(*layers)
+    found = ET.fromstring(plot_svg("", "", "deviation of x_ram_dot [m/s]", layers))
+    texts = [(item.text or "", item.attrib) for item in found if item.tag == "text"]
+    shown = [(text, float(at["x"])) for text, at in texts if at.get("text-anchor") == "middle"]
+    rows = [[(at, at, text) for text, at in shown if text]]
+    rows.append([(float(at["x"]), 0, text) for text, at in texts if at.get("y") == "13"])
+    assert len(rows[1]) == 4
+    assert len(across) >= 2
+    numbers = sorted((at - 3 * len(text), at + 3 * len(text)) for at, _, text in rows[0])
+    names = sorted(
+        (x - 6 * len(text), x) if x else (0.0, 6.0 * len(text)) for x, _, text in rows[1]
+    )
+    for own in (numbers, names):
+        assert all(a[1] <= b[0] for a, b in itertools.pairwise(own))
