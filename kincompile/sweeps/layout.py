@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from contextlib import suppress
 from dataclasses import dataclass
@@ -207,17 +208,16 @@ def _motion_measure(solution: Solution, given: str) -> Kept | None:
         return None
     of, measure = form[1], form[2]
     words = re.findall(r"[^\s,]+", form[3] or "")
-    part: list[Any] = []
     try:
         part = [x if x in ("max", "min") and measure == "dwell" else float(x) for x in words]
-        fits = len(part) in {"dwell": (1, 2), "grashof": (0,)}.get(measure, (0, 2))
     except ValueError:
-        fits = False
-    if not fits:
+        part = [math.nan]
+    if not _fits(measure, part):
         raise InputError(
-            f"{given!r}: write it as 'P.straightness', 'P.roundness(0.2, 0.7)' of a part of the "
-            "time, 'ram.x.dwell(0.5)' or 'ram.x.dwell(0.5, min)' of how near it keeps to its "
-            "greatest or least value, or 'crank.grashof' of the four-bar with that link."
+            f"{given!r}: write it as 'P.straightness', 'P.roundness(0.2, 0.7)' from a time to a "
+            "later one, 'ram.x.dwell(0.5)' or 'ram.x.dwell(0.5, min)', with a positive number, of "
+            "how near it keeps to its greatest or least value, or 'crank.grashof' of the four-bar "
+            "with that link."
         )
     if measure == "dwell":
         of, unit = solution.column(of).name, TIME_UNIT
@@ -228,6 +228,16 @@ def _motion_measure(solution: Solution, given: str) -> Kept | None:
         unit = solution.column(path_columns(solution, of)[0]).unit
     name = "_".join((of, measure, *words))
     return Kept(name, unit, of, measure, part=tuple(part))
+
+
+def _fits(measure: str, part: Sequence[Any]) -> bool:
+    """Return whether what is between brackets is of a measure of the motion."""
+    numbers = [x for x in part if not isinstance(x, str)]
+    if not all(map(math.isfinite, numbers)):
+        return False
+    if measure == "dwell":
+        return 1 <= len(part) <= 2 and numbers[:1] == part[:1] and numbers[0] > 0
+    return not part or (measure != "grashof" and len(part) == 2 and part[0] < part[1])
 
 
 def _measure(solution: Solution, given: str, bearing: Solution | None) -> Kept:

@@ -8,6 +8,7 @@ const AT_REST = 1e-10;  // rate, relative to the largest, that is zero
 const REPEATS = 1e-7;  // difference, relative to its stroke, up to which an output repeats itself
 const LOCATED = 1e-13;  // part of the span of times to which a zero is located
 const ROOT_STEPS = 60;
+const POLE = 1e6;  // how many times an output is larger at a pole than at the times beside it
 const STEP_PARTS = 8;  // of a step, at which a path is looked at
 
 class OutputMotion {
@@ -27,6 +28,7 @@ class OutputMotion {
     this.y_ddot = column(motion.y_ddot);
     this.span = this.t[this.t.length - 1] - this.t[0];
     this.most = largestOf(this.y_dot);
+    this.isFar = farOf(this.y);
     this.known = new Map(this.t.map((t, row) => [t, [this.y[row], this.y_dot[row], this.y_ddot[row]]]));
     this.noise = STILL * this.scale(rows);
   }
@@ -34,8 +36,12 @@ class OutputMotion {
   /* The largest number of its unit, of coordinates and outputs; of angles at least a radian. */
   scale(rows) {
     const { coordinates, outputs } = player.data, { motion, unit } = this;
+    const near = values => {
+      const isFar = farOf(values);
+      return values.filter((_, row) => !isFar[row]);
+    };
     const of = (items, values) => items.flatMap((item, k) =>
-      (item.unit === unit ? [largestOf(rows.map(row => values[row * items.length + k]))] : []));
+      (item.unit === unit ? [largestOf(near(rows.map(row => values[row * items.length + k])))] : []));
     return Math.max(unit === 'rad' ? 1 : 0, ...of(coordinates, motion.q), ...of(outputs, motion.y));
   }
 
@@ -47,6 +53,35 @@ class OutputMotion {
       this.known.set(t, state ? values(state) : [NaN, NaN, NaN]);
     }
     return this.known.get(t);
+  }
+
+  /* When it falls below and rises above all bounds: on the grid, and where it changes its sign against its rate. */
+  poles() {
+    const { t, y, y_dot, isFar } = this, found = [[], []];
+    for (const row of t.keys()) {
+      if (isFar[row]) for (const value of y.slice(Math.max(row - 1, 0), row + 2)) found[+(value > 0)].push(t[row]);
+    }
+    for (let a = 0; a + 1 < t.length; a++) {
+      const rise = y[a + 1] - y[a];
+      if (isFar[a] || isFar[a + 1] || !(y[a] * y[a + 1] < 0 && rise * y_dot[a] < 0 && rise * y_dot[a + 1] < 0)) continue;
+      let [low, high] = [t[a], t[a + 1]], time = low, most = 0;
+      for (let k = 0; k < ROOT_STEPS && high - low > LOCATED * this.span; k++) {
+        const middle = (low + high) / 2, value = this.at(middle)[0];
+        if (Math.abs(value) > most) [most, time] = [Math.abs(value), middle];
+        if (value * y[a] > 0) low = middle; else high = middle;
+      }
+      if (most > POLE * Math.max(Math.abs(y[a]), Math.abs(y[a + 1]))) for (const times of found) times.push(time);
+    }
+    return found;
+  }
+
+  /* The extremes of an output with poles; it has no mean. */
+  unbounded(below, above) {
+    const { t, y, isFar, name, unit } = this;
+    const best = sign => [...t.keys()].filter(row => !isFar[row]).reduce((k, row) => (sign * y[row] > sign * y[k] ? row : k));
+    const [tLeast, least] = below.length ? [Math.min(...below), -Infinity] : [t[best(-1)], y[best(-1)]];
+    const [tGreatest, greatest] = above.length ? [Math.min(...above), Infinity] : [t[best(1)], y[best(1)]];
+    return { name, unit, least, tLeast, greatest, tGreatest, dead: [], period: null, rests: () => [0, 0], timeRatio: null, mean: NaN, rms: Infinity };
   }
 
   /* The times at which it turns back, and where it comes to rest. */
@@ -190,6 +225,8 @@ class OutputMotion {
   }
 
   measures() {
+    const [below, above] = this.poles();
+    if (below.length || above.length) return this.unbounded(below, above);
     const dead = this.deadPoints(), period = this.period(dead), [mean, square] = this.means();
     const [[tLeast, least], [tGreatest, greatest]] = [this.extreme(dead, -1), this.extreme(dead, 1)];
     return {
@@ -198,6 +235,13 @@ class OutputMotion {
       timeRatio: this.timeRatio(dead, period), mean, rms: Math.sqrt(Math.max(square, 0)),
     };
   }
+}
+
+/* Which values lie on a pole, as those of a ratio of rates. */
+function farOf(values) {
+  const sizes = values.map(x => (Number.isFinite(x) ? Math.abs(x) : 0)).sort((a, b) => a - b), half = sizes.length / 2;
+  const middle = (sizes[Math.floor(half)] + sizes[Math.ceil(half) - 1]) / 2;
+  return values.map(x => Math.abs(x) === Infinity || (middle > 0 && Math.abs(x) > middle / STILL));
 }
 
 function largestOf(values) {
@@ -211,6 +255,7 @@ function measuresOf(motion) {
 }
 
 function shortNumber(value) {
+  if (Math.abs(value) === Infinity) return value > 0 ? '∞' : '−∞';
   return Number.isFinite(value) ? `${+value.toPrecision(6)}` : '–';
 }
 

@@ -187,6 +187,9 @@ def test_that_paths_plots_numbers_and_newton_follow(open_page: Callable[..., Any
 
 def test_that_measures_are_those_of_python(open_page: Callable[..., Any]) -> None:
     model = crank_rocker("measured")
+    crank, _, rocker = model.bodies
+    model.output("gain", kc.outputs.mechanical_advantage(rocker.phi, crank.phi))  # it has poles
+    model.output("ratio", kc.outputs.velocity_ratio(rocker.phi, crank.phi))
     page = open_page(model)
     page.get_by_role("tab", name="Measures").click()
     for values in ({}, {"a": 1.3, "d": 3.2}):
@@ -201,19 +204,26 @@ def test_that_measures_are_those_of_python(open_page: Callable[..., Any]) -> Non
         }  # fmt: skip
         for own, output in zip(found, known.outputs, strict=True):
             for one, other in pairs.items():
+                if output.name == "ratio" and one in ("mean", "rms"):
+                    continue  # without an emitted second rate the page has none
                 expected = getattr(output, other)
                 close = (
-                    pytest.approx(expected, rel=1e-9, abs=1e-9) if expected is not None else None
+                    pytest.approx(expected, rel=1e-9, abs=1e-9, nan_ok=True)
+                    if expected is not None
+                    else None
                 )
                 assert own[one] == close, one
             assert own["dead"] == pytest.approx(output.dead_points, abs=1e-9)
         shown = page.inner_text("#panel-measures")
         assert f"{known.outputs[0].least:.6g}" in shown
+        assert "\u2212\u221e" in shown  # minus infinity
         motion = kc.solve(kc.compile(model), np.linspace(0, 2, 61), values)
         rests = page.evaluate(
             "measuresOf(live.motionNow()).map(({ name, rests }) => [name, ...rests(0.02)])"
         )
         for name, *times in rests:
+            if name in ("gain", "ratio"):  # a pole; no emitted second rate
+                continue
             stroke = known[name].stroke
             own = [motion.dwell(name, 0.02 * stroke, at).time for at in ("min", "max")]
             assert times == pytest.approx(own, rel=1e-6, abs=1e-9), name

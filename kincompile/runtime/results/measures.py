@@ -39,6 +39,9 @@ if TYPE_CHECKING:
     from kincompile.runtime.results.columns import MotionTable
     from kincompile.runtime.results.observed import Between
 
+POLE = 1e6
+"""How many times an output is larger at a pole than at the points of the grid beside it."""
+
 GAUSS_PLACES = 8
 """Places for the integral over a step at whose ends a rate does not exist."""
 
@@ -62,7 +65,8 @@ class OutputMeasures:
         Of a cyclic output with two dead points in a period, the longer by the shorter of the two
         times between them.
     mean, rms : float
-        Over time.
+        Over time. Of an output with a pole, as a mechanical advantage at a dead point, an extreme
+        is infinite, and there is no mean.
     """
 
     name: str
@@ -180,6 +184,9 @@ def _all_measured(
 def _measured(motion: ObservedMotion, k: int) -> Between[OutputMeasures]:
     """Return the measures of output k."""
     name = motion.names[k]
+    below, above = yield from _poles(motion, k)
+    if below or above:
+        return _unbounded(motion, k, below, above)
     dead, kinks = yield from _dead_points(motion, k)
     least = yield from _extreme(motion, k, dead, -1)
     greatest = yield from _extreme(motion, k, dead, 1)
@@ -188,6 +195,46 @@ def _measured(motion: ObservedMotion, k: int) -> Between[OutputMeasures]:
     return OutputMeasures(
         name, motion.units[name], least[1], least[0], greatest[1], greatest[0], tuple(dead),
         period, _time_ratio(motion, dead, period), mean, math.sqrt(max(square, 0.0)),
+    )  # fmt: skip
+
+
+def _poles(motion: ObservedMotion, k: int) -> Between[tuple[list[float], list[float]]]:
+    """Return when an output falls below, and rises above, all bounds.
+
+    That is where it is so on the grid, and where it changes its sign against its rate.
+    """
+    t, y, y_dot, is_far = motion.t, motion.y[:, k], motion.y_dot[:, k], motion.is_far[:, k]
+    found: tuple[list[float], list[float]] = ([], [])
+    for row in np.flatnonzero(is_far).tolist():
+        for value in y[max(row - 1, 0) : row + 2].tolist():
+            found[int(value > 0)].append(float(t[row]))
+    against = (y[:-1] * y[1:] < 0) & (np.diff(y) * y_dot[:-1] < 0) & (np.diff(y) * y_dot[1:] < 0)
+    for a in np.flatnonzero(against & ~is_far[:-1] & ~is_far[1:]).tolist():
+        search = zero(float(t[a]), float(t[a + 1]), ROOT_LENGTH * motion.span)
+        time, value = next(search), math.nan
+        with suppress(StopIteration):
+            while True:
+                value, rate, _ = yield from motion.at(time, k)
+                time = search.send((1 / value, -rate / value**2) if value else (math.nan, math.nan))
+        if abs(value) > POLE * max(abs(y[a]), abs(y[a + 1])):
+            found[0].append(time)
+            found[1].append(time)
+    return found
+
+
+def _unbounded(
+    motion: ObservedMotion, k: int, below: list[float], above: list[float]
+) -> OutputMeasures:
+    """Return the measures of an output with poles: its extremes, and no mean."""
+    t, y = motion.t, np.where(motion.is_far[:, k], np.nan, motion.y[:, k])
+    low, high = (
+        int(find(y)) if np.isfinite(y).any() else 0 for find in (np.nanargmin, np.nanargmax)
+    )
+    least = (min(below), -math.inf) if below else (float(t[low]), float(y[low]))
+    greatest = (min(above), math.inf) if above else (float(t[high]), float(y[high]))
+    return OutputMeasures(
+        motion.names[k], motion.units[motion.names[k]], least[1], least[0], greatest[1],
+        greatest[0], (), None, None, math.nan, math.inf,
     )  # fmt: skip
 
 

@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from kincompile.criteria import FIRST_DIFFERENCE, MAX_CORRECTIONS, SLIGHT, TOLERANCE, probe_of
+from kincompile.criteria import (
+    FIRST_DIFFERENCE,
+    MAX_CORRECTIONS,
+    SLIGHT,
+    STILL,
+    TOLERANCE,
+    probe_of,
+)
 from kincompile.runtime.engine.linear import Planned, trusted
 from kincompile.runtime.march import March, State, all_hold
 from kincompile.runtime.memory import empty
@@ -162,6 +169,11 @@ class ObservedMotion:
         self.known: dict[float, Array] = dict(zip(self.t.tolist(), on_grid, strict=True))
         self._states: dict[int, State | None] = {}
         self._is_free = len(code.equations) < len(solution.coordinates)
+        size = np.abs(y)
+        with np.errstate(invalid="ignore"):
+            middle = np.median(np.where(np.isfinite(size), size, 0.0), axis=0)
+        # Points of the grid that lie on a pole, as those of a ratio of rates.
+        self.is_far: NDArray[np.bool_] = np.isinf(size) | ((size > middle / STILL) & (middle > 0))
         self._scales = self._largest()
 
     def scale(self, k: int) -> float:
@@ -258,7 +270,8 @@ class ObservedMotion:
     def _largest(self) -> dict[str, float]:
         """Return the largest number of each unit."""
         names = (*self._solution.coordinates, *self.names)
-        values = np.abs(np.column_stack((self._solution.q[self.rows], self.y))).max(axis=0)
+        y = np.where(self.is_far, 0.0, self.y)
+        values = np.abs(np.column_stack((self._solution.q[self.rows], y))).max(axis=0)
         units = self._solution.units
         found: dict[str, float] = {"rad": 1.0}
         for name, value in zip(names, values.tolist(), strict=True):

@@ -205,3 +205,82 @@ def test_what_cannot_be_written_is_said_before_the_work(kincompile, model, tmp_p
     assert "end its name in .zarr, .parquet" in done.stderr
     done = sweep(kincompile, model(""))
     assert "nothing is swept" in done.stderr
+
+
+OF_MOTIONS = """
+[sweep]
+parameters = { OC = [1.8, 2.0, 9.0] }
+measures = ["P.straightness(0, 0.5)", "P.roundness(0.1, 0.2)", "rocker.phi.dwell(0.01)",
+    "rocker.phi.dwell(0.01, min)", "crank.grashof", "gain.least", "gain.greatest"]
+"""
+
+
+@pytest.fixture
+def hoeken():
+    """Return Hoeken's linkage with its mechanical advantage as an output."""
+    found = kc.linkages.hoeken().mechanism()
+    crank, _, rocker = found.bodies
+    found.output("gain", kc.outputs.mechanical_advantage(rocker.phi, crank.phi))
+    found.points = 73
+    return found
+
+
+def test_measures_of_motions_in_a_table(kincompile, model, hoeken, tmp_path):
+    """As of each motion alone; of lengths that cannot be assembled there are none."""
+    store = tmp_path / "a.zarr"
+    done = sweep(kincompile, model(OF_MOTIONS, hoeken), "-o", store)
+    assert done.exit_code == 0, done.stderr
+    assert "motions: 2 CONVERGED, 1 NOT_ASSEMBLED" in done.stdout
+    found = xarray.open_zarr(store, consolidated=False, chunks=None)
+    names = [
+        "P_straightness_0_0.5", "P_roundness_0.1_0.2", "phi_rocker_dwell_0.01",
+        "phi_rocker_dwell_0.01_min", "crank_grashof", "gain_least", "gain_greatest",
+    ]  # fmt: skip
+    assert all(np.isnan(found[name][2]) for name in names)
+    module = kc.compile(hoeken)
+    for k, ground in enumerate((1.8, 2.0)):
+        alone = kc.solve(module, np.linspace(0, 1, 73), {"OC": ground})
+        gain = alone.measures()["gain"]
+        expected = [
+            alone.straightness("P", (0, 0.5)).deviation,
+            alone.roundness("P", (0.1, 0.2)).deviation,
+            alone.dwell("rocker.phi", 0.01, "max").time,
+            alone.dwell("rocker.phi", 0.01, "min").time,
+            ground - 1.0,  # p + q - s - l of 1, 2.5, 2.5 and the ground
+            gain.least,
+            gain.greatest,
+        ]
+        np.testing.assert_allclose([found[name][k] for name in names], expected, rtol=1e-9)
+    assert {*found.data_vars} == {*names, "status"}
+    rows = [line.split()[:2] for line in done.stdout.splitlines()]
+    for name, unit in zip(names, ("m", "m", "s", "s", "m"), strict=False):
+        assert [name, unit] in rows
+
+
+@pytest.mark.parametrize(
+    ("measure", "message"),
+    [
+        ("P.straightness(0.5, 0)", "from a time to a later one"),
+        ("P.straightness(0.5, 0.5)", "from a time to a later one"),
+        ("P.straightness(nan, 1)", "'P.straightness(nan, 1)': write it as"),
+        ("P.straightness(a, b)", "'P.straightness(a, b)': write it as"),
+        ("P.roundness(0.2)", "'P.roundness(0.2)': write it as"),
+        ("Q.roundness", "no column 'Q.x'; did you mean 'x_P'?"),
+        ("x_P.roundness", "Name the point: 'P'."),
+        ("rocker.phi.dwell", "'ram.x.dwell(0.5)'"),
+        ("rocker.phi.dwell(-1)", "with a positive number"),
+        ("rocker.phi.dwell(inf)", "with a positive number"),
+        ("rocker.phi.dwell(max)", "with a positive number"),
+        ("rocker.phi.dwell(1, max, 3)", "with a positive number"),
+        ("P.dwell(1)", "no column 'P'"),
+        ("crank.grashof(1)", "'crank.grashof' of the four-bar with that link"),
+        ("handle.grashof", "the links of the four-bars are: ground, crank, coupler, rocker"),
+        ("gain.grasshof", "did you mean 'grashof'?"),
+    ],
+)
+def test_wrong_measures_of_motions(kincompile, model, hoeken, tmp_path, measure, message):
+    table = f'[sweep]\nparameters = {{ OC = [2.0] }}\nmeasures = ["{measure}"]\n'
+    done = sweep(kincompile, model(table, hoeken), "-o", tmp_path / "a.zarr")
+    assert done.exit_code == 2
+    assert message in " ".join(done.stderr.split())
+    assert not (tmp_path / "a.zarr").exists()

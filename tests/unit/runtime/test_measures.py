@@ -314,3 +314,37 @@ def test_the_mechanical_advantage_is_the_ratio_of_forces():
     np.testing.assert_allclose(found["gain"], 1 / ratio, rtol=1e-12)
     torque = kc.forces(found)["drive_crank.drive"]  # [N mm]: what the driver puts in
     np.testing.assert_allclose(500 / torque, found["gain"], rtol=1e-12)
+
+
+@pytest.mark.parametrize("points", [73, 77, 361])
+def test_poles_of_a_mechanical_advantage(points):
+    """On the grid, 73 and 361, and beside it: infinite extremes, and other outputs keep theirs."""
+    model = kc.linkages.hoeken().mechanism()
+    crank, _, rocker = model.bodies
+    model.output("ratio", kc.outputs.velocity_ratio(rocker.phi, crank.phi))
+    alone = kc.solve(kc.compile(model), np.linspace(0, 1, points)).measures()["ratio"]
+    model.output("gain", kc.outputs.mechanical_advantage(rocker.phi, crank.phi))
+    found = kc.solve(kc.compile(model), np.linspace(0, 1, points)).measures()
+    assert (found["gain"].least, found["gain"].greatest) == (-math.inf, math.inf)
+    # Dead points of the rocker, where crank and coupler are in one line: 1.5 or 3.5 from O to B.
+    angles = [math.acos((4 + r * r - 2.5**2) / (4 * r)) for r in (1.5, 3.5)]
+    dead = sorted(
+        (angle / (2 * math.pi) + part) % 1 for angle, part in zip(angles, (0.25, 0.75), strict=True)
+    )
+    assert found["gain"].t_least == pytest.approx(min(dead), abs=1e-9)
+    assert found["gain"].dead_points == ()
+    assert math.isnan(found["gain"].mean)
+    for name in ("least", "greatest", "t_least", "t_greatest", "mean", "rms"):
+        assert getattr(found["ratio"], name) == pytest.approx(getattr(alone, name), rel=1e-9)
+    t = np.linspace(0, 1, 100001)
+    ratio = kc.solve(kc.compile(model), t[::50])["ratio"]
+    assert found["ratio"].least == pytest.approx(ratio.min(), rel=1e-5)
+    assert found["ratio"].greatest == pytest.approx(ratio.max(), rel=1e-5)
+
+
+def test_that_a_jump_of_an_angle_is_no_pole():
+    model = kc.linkages.hoeken().mechanism()
+    crank = model.bodies[0]
+    model.output("turn", sympy.atan2(sympy.sin(crank.phi), sympy.cos(crank.phi)))
+    found = kc.solve(kc.compile(model), np.linspace(0, 1, 73)).measures()["turn"]
+    assert found.greatest <= math.pi + 1e-9
