@@ -68,7 +68,7 @@ def test_that_nothing_and_one_value_can_be_plotted():
 @pytest.mark.parametrize("ends", [(-1.3e-4, 2.2e-4), (0.0, 12.0), (-987654.0, 0.0), (1e8, 4e8)])
 def test_that_no_numbers_and_names_meet(ends):
     """With 6 units a letter, which is more than a digit of 11 units has."""
-    x = np.linspace(*ends, 5)
+    x = np.linspace(ends[0], ends[1], 5)
     layers = [Layer("line", x, X[:5], name=name) for name in ("worst case", "RSS", "samples")]
     across, _, _ = read(*layers)
     found = ET.fromstring(plot_svg("", "", "deviation of x_ram_dot [m/s]", layers))
