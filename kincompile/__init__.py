@@ -30,6 +30,8 @@ __version__ = "0.1.0"
 def __getattr__(name: str) -> Any:
     if name == "__all__":
         return sorted((*_HOME, *_constraint_types()))
+    if name.startswith("__"):  # what tools ask any module for, a thousand times: no advice
+        raise AttributeError(f"module 'kincompile' has no attribute {name!r}")
     homes = _HOME
     if name not in homes and (name[:1].isupper() or _CATALOGUE in sys.modules):
         homes = _HOME | dict.fromkeys(_constraint_types(), _CATALOGUE)
