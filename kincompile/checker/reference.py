@@ -30,7 +30,7 @@ from kincompile.criteria import size_of
 from kincompile.errors import InputError
 from kincompile.ir.from_sympy import Converter
 from kincompile.ir.graph import Graph
-from kincompile.ir.interpret import interpret, run
+from kincompile.ir.interpret import interpreter, run
 from kincompile.ir.lower import lower
 from kincompile.model.matrices import EquationRow, assemble
 from kincompile.model.mechanism import system_of
@@ -306,10 +306,15 @@ class Reference:
         """Evaluate the generated quantities, once at each states."""
         if states not in self._values:
             with np.errstate(all="ignore"):
-                found = interpret(self.program, states.q, states.q_dot, states.t, states.p.T)
+                found = self._interpreted(states.q, states.q_dot, states.t, states.p.T)
             names = [item.name for item in self.program.quantities]
             self._values[states] = Values(dict(zip(names, found, strict=True)))
         return self._values[states]
+
+    @cached_property
+    def _interpreted(self) -> Callable[..., tuple[Array, ...]]:
+        """What evaluates the program: to prepare it takes as long as to evaluate it."""
+        return interpreter(self.program)
 
     @cached_property
     def random(self) -> States:
