@@ -144,7 +144,7 @@ def solutions(case, way):
 RATES = (1.0, 0.7, 1.0)
 """How fast the clock of each variant goes; equal ones have equal statuses."""
 
-SHARE = 1 if "ADVERSARY_REPORT" in os.environ else 2
+SHARE = 1 if "ADVERSARY_REPORT" in os.environ else 4
 """Part of the seeds that the slow suite tries; `python -m tests.adversary` tries all."""
 SEEDS = {"methods": 160, "placements": 40, "grouped": 40, "variants": 40, "c": 8}
 QUICK = {"methods": 8, "placements": 2, "grouped": 3, "variants": 3, "c": 1}
