@@ -107,7 +107,7 @@ test-elsewhere: export OPENBLAS_CORETYPE := Haswell
 test-elsewhere: export OPENBLAS_NUM_THREADS := 2
 test-elsewhere: export GLIBC_TUNABLES := glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usable,-FMA_Usable
 test-elsewhere: $(TEST_READY)
-	@NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c '$(FEATURES)')" $(PYTEST) --numprocesses=auto --dist=loadgroup $(ROUNDED) $(NOT_ROUNDED)
+	@NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c '$(FEATURES)')" $(PYTEST) --numprocesses=auto --dist=loadgroup -m "not slow or printed" $(ROUNDED) $(NOT_ROUNDED)
 
 # The scripts of a page share one scope, so that each kind of page is read by itself.
 PAGES := plane space gallery watch

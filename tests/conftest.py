@@ -5,6 +5,7 @@ import os
 import runpy
 import shutil
 import subprocess
+from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -43,7 +44,17 @@ all hostile files, takes a minute and more to find out."""
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let one process have the tests of a file, which share what is made; slow ones go alone."""
+    """Keep every n-th case of `every(n)` quick, and let one process have the tests of a file.
+
+    These share what is made; slow ones go alone.
+    """
+    cases = Counter[str]()
+    for item in items:
+        mark, function = item.get_closest_marker("every"), item.nodeid.partition("[")[0]
+        if mark and not item.get_closest_marker("slow"):
+            if cases[function] % mark.args[0]:
+                item.add_marker(pytest.mark.slow)
+            cases[function] += 1
     if not config.getoption("loadgroup", False):  # `--dist=loadgroup`, as the Makefile asks
         return
     for item in items:

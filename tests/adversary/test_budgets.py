@@ -103,6 +103,7 @@ def check(folder, record, tried=None):
     return found
 
 
+@pytest.mark.slow
 def test_formulas_that_grow_and_files_without_end(tmp_path, record):
     """Sparse files of 20 GB, links to a device without end and to themselves; towers of powers."""
     write(formulas(random.Random(1), 3), tmp_path)

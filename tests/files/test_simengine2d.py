@@ -74,6 +74,7 @@ FIGURES: dict[str, tuple[str, str, int, list[str], list[tuple[float, ...]]]] = {
 }  # fmt: skip
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("case", FIGURES)
 def test_that_the_command_line_gives_the_reference_figures(case, tmp_path):
     model, analysis, index, columns, figures = FIGURES[case]

@@ -144,6 +144,7 @@ def test_that_wrong_input_is_a_message(folder, case):
     assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("case", ["missing file", "syntax error", "exception", "points zero"])
 def test_that_a_process_says_the_same(folder, case):
     arguments, parts = prepared(folder, case)

@@ -284,6 +284,7 @@ def a_knife_edge_on_a_cam() -> Moving:
     return m, {"y_follower": profile.subs(kc.alpha, top) + 0.2, "alpha_touch": top}
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("name", CASES)
 def test_that_it_moves_as_mechanics_says(name: str) -> None:
     kind, make = CASES[name]

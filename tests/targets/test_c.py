@@ -44,6 +44,7 @@ def test_strict_compilers_have_nothing_to_say(example, quick_compiler, tmp_path,
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.every(5)
 def test_a_header_can_be_included_alone_and_twice(example, quick_compiler, tmp_path):
     source, header = example.files("c")
     (tmp_path / header).write_text(example.files("c")[header])
@@ -156,6 +157,7 @@ def test_a_far_angle_does_not_spoil_its_neighbours(angles):
     np.testing.assert_allclose(angles.Phi(q, 0.0)[:, 0], np.cos(theta), rtol=0, atol=2e-16)
 
 
+@pytest.mark.slow
 def test_that_a_point_is_the_same_in_any_company(monkeypatch, tmp_path, quick_compiler):
     # Optimized, points that fill no register are computed with what lies beyond them.
     monkeypatch.setenv("CC", quick_compiler)

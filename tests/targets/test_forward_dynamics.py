@@ -182,6 +182,7 @@ def test_that_octave_has_them_and_integrates(octave, tmp_path):
     np.testing.assert_allclose(own.y[:n, -1], motion.q[-1], atol=1e-8)
 
 
+@pytest.mark.slow
 def test_that_octave_starts_and_moves_alike_in_every_unit_of_length(octave, tmp_path):
     """From a guess that is not assembled; kc.simulate is the oracle."""
     units, lines = (1e-6, 1.0, 1e6), []

@@ -92,6 +92,7 @@ def jobs_of(model, module):
     return [[t.tolist(), p.tolist(), module.GUESS.tolist()] for p in sets for t in grids]
 
 
+@pytest.mark.every(5)
 @pytest.mark.filterwarnings("ignore::kincompile.errors.SingularConfigurationWarning")
 def test_that_motions_of_examples_are_those_of_the_runtime(solved, example):
     jobs = jobs_of(example.model, example.module)
@@ -197,6 +198,7 @@ CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.filterwarnings("ignore::kincompile.errors.CornerWarning")
 @pytest.mark.filterwarnings("ignore::kincompile.errors.AssemblyWarning")

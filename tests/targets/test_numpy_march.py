@@ -52,6 +52,7 @@ def compare(module, t, p=None):
     return solution
 
 
+@pytest.mark.every(5)
 def test_that_motions_of_examples_are_those_of_the_runtime(loaded, example):
     module = loaded(example.model)
     for t, p, _ in jobs_of(example.model, module):
@@ -83,6 +84,7 @@ def test_that_lock_ups_are_among_them(loaded, example_named):
     assert {Status.CONVERGED, Status.LOCK_UP} <= {x for item in solutions for x in item.status}
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("case", CASES)
 def test_that_a_motion_ends_as_by_the_text(loaded, monkeypatch, case):
     """As in C and Rust, where the text on NumPy has arrays, in which nothing raises."""

@@ -35,6 +35,7 @@ def the_event(solution):
 LOCK_UP, BIFURCATION = "End the motion before this time", "through='smooth'"
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("name", "p", "kind", "time", "bodies", "next_step"),
     [

@@ -126,6 +126,7 @@ def test_that_another_way_through_is_refused(r4):
         kc.solve(r4, 0, through="both")
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(12))
 def test_the_change_point_of_a_parallelogram(parallelogram, method, seed):

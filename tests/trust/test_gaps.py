@@ -33,6 +33,7 @@ def test_a_gap_is_no_lock_up(form, quick_compiler):
     assert "steps were not enough: ask for more times" in solution.message
 
 
+@pytest.mark.slow
 def test_a_time_beyond_all_angles_is_a_status(pendulum):
     solution = kc.solve(pendulum, [0, 1e200])
     assert not solution.success
@@ -62,6 +63,7 @@ def test_a_gap_of_too_many_turns_ends_with_what_to_do_and_shows_progress(monkeyp
     assert len(seen) >= 4
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("method", ["grid", "march"])
 @pytest.mark.parametrize(("points", "end"), [(121, 6), (13, 6), (1000, 4.6), (300, 4.52), (7, 30)])
 def test_a_lock_up_is_an_event_on_every_grid(method, points, end):

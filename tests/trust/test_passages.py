@@ -78,6 +78,7 @@ def test_that_points_close_to_the_bifurcation_do_not_lead_past_it(parallelograms
             check(parallelograms, path, t)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("path", ["march", "grid", "compiled", "grouped"])
 @pytest.mark.parametrize("points", [20, 1000])
 def test_that_every_path_goes_on_along_the_smooth_branch(parallelograms, path, points):

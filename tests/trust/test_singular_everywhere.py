@@ -30,6 +30,7 @@ def four_bars(count, width, angle):
     return m
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("angle", [0.0, 0.7])
 @pytest.mark.parametrize("width", [1.0, 1.5])
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 8, 12])

@@ -79,6 +79,7 @@ def model(request):
     return MODELS[request.param]()
 
 
+@pytest.mark.every(5)
 def test_that_an_example_passes(example):
     found = kc.verify(example.module)
     assert found.passed
@@ -91,6 +92,7 @@ def test_that_an_example_passes(example):
     assert max(check.error for check in found.table) < 1e-9
 
 
+@pytest.mark.every(5)
 def test_that_the_grouped_form_passes(example):
     assert kc.verify(kc.compile(example.model, form="grouped")).passed
 
@@ -105,6 +107,7 @@ def test_that_a_model_that_is_hard_for_complex_numbers_passes(model, form):
     assert kc.verify(kc.compile(model, form=form)).passed
 
 
+@pytest.mark.every(5)
 def test_that_such_a_model_passes_in_c(model, quick_compiler):
     assert kc.verify(kc.compile(model, target="c")).passed
 
@@ -186,6 +189,7 @@ def test_that_a_fault_of_compiled_c_is_found(example_named, quick_compiler):
     assert [check.entry for check in found.table if not check.passed] == ["gamma of B.y"]
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("right", "wrong", "entry"),
     [

@@ -172,12 +172,21 @@ def failure_of(reader: Reader, block: re.Match[str]) -> str:
     return ""
 
 
+LONG = {
+    "docs/course/museum.md", "docs/dynamics.md", "docs/in_c.md", "docs/in_javascript.md",
+    "docs/in_octave.md", "docs/in_rust.md", "docs/other_programs.md", "docs/sweeps.md",
+    "docs/synthesis.md", "docs/transmissions.md",
+}  # fmt: skip
+"""Pages that take more than a second."""
+SHOWN = [
+    pytest.param(page, least, False, marks=[pytest.mark.slow] * (page in LONG))
+    for page, least in RUN.items()
+]
 REAL = pytest.param("README.md", RUN["README.md"], True, marks=pytest.mark.slow)
 
 
-@pytest.mark.parametrize(
-    ("page", "least", "is_real"), [*((page, least, False) for page, least in RUN.items()), REAL]
-)
+@pytest.mark.printed
+@pytest.mark.parametrize(("page", "least", "is_real"), [*SHOWN, REAL])
 def test_that_a_page_does_what_it_says(page, least, is_real, tmp_path):
     reader = Reader(tmp_path, is_real)
     (tmp_path / "examples").symlink_to(ROOT / "examples")

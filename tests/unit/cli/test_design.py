@@ -127,6 +127,7 @@ def test_target_that_is_not_reached_is_told_and_exits_with_3(kincompile, file, t
     assert kc.read(written).name == "slider_crank"
 
 
+@pytest.mark.slow
 def test_files_with_tables_keep_to_the_schema(file):
     jsonschema = pytest.importorskip("jsonschema", reason="jsonschema is not installed")
     data = tomllib.loads(file().read_text(encoding="utf-8"))

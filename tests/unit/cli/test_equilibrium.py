@@ -29,6 +29,7 @@ def run(*arguments):
     return CliRunner().invoke(cli, [str(item) for item in arguments])
 
 
+@pytest.mark.slow
 def test_that_it_lists_the_position_and_whether_it_is_stable(model):
     done = run("equilibrium", model)
     assert done.exit_code == 0, done.stderr

@@ -94,6 +94,7 @@ def test_that_a_device_is_written_to_and_not_replaced(process, pendulum):
     assert done.stdout == kc.emit(kc.read_model(pendulum)).source
 
 
+@pytest.mark.slow
 def test_that_units_beyond_ascii_are_shown_on_any_terminal(process, pendulum, monkeypatch):
     pendulum.write_text(pendulum.read_text().replace('unit="m"', 'unit="µm"'), encoding="utf-8")
     monkeypatch.setenv("PYTHONIOENCODING", "ascii")
@@ -102,6 +103,7 @@ def test_that_units_beyond_ascii_are_shown_on_any_terminal(process, pendulum, mo
     assert "µm" in done.stdout
 
 
+@pytest.mark.slow
 def test_that_what_a_model_prints_is_no_data(process, pendulum):
     pendulum.write_text(pendulum.read_text() + "\nprint('hello from the model')\n")
     done = process("compile", pendulum, "-o", "-")
@@ -129,6 +131,7 @@ def test_that_help_and_version_load_neither_sympy_nor_rich(option):
     assert loaded_by(option) & {"sympy", "scipy", "rich"} == set()
 
 
+@pytest.mark.slow
 def test_that_a_command_in_a_pipe_does_not_load_rich(pendulum):
     assert loaded_by("run", str(pendulum)) & {"sympy", "rich"} == {"sympy"}
 

@@ -39,6 +39,7 @@ def require_unknown(report: Report, n: int) -> None:
         assert diagnosis.text.startswith(UNKNOWN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [6, 8])
 def test_that_a_function_is_called_a_bounded_number_of_times(n: int) -> None:
     numbers = np.random.default_rng(n).normal(size=(n, n))

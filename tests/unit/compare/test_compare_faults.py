@@ -83,6 +83,7 @@ def pair(places: list[tuple[str, str]], x: str, y: str) -> dict[Any, str]:
     return dict(zip(places, (x, y), strict=True))
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("quantity", "entries", "kind"),
     [

@@ -90,6 +90,7 @@ def test_that_phi_q_must_be_the_derivative_of_its_own_phi() -> None:
     assert cylinder(**HALF).equal
 
 
+@pytest.mark.slow
 def test_that_a_function_may_have_another_form() -> None:
     def Phi(q: Any, t: float) -> list[float]:
         at = q[0] + 200 * np.cos(q[2]) + 300, q[1] + 200 * np.sin(q[2]) + 190
@@ -133,6 +134,7 @@ def test_that_a_slip_is_no_other_equation_that_only_phi_q_shows(joint_types: Any
         assert {d.kind for e in report.different for d in e.diagnoses} == {"xi and eta swapped"}
 
 
+@pytest.mark.slow
 def test_that_an_angle_in_another_assembly_is_no_solution() -> None:
     assert not guide(u, psi - sympy.pi).equal
     assert not guide(u, psi**2).equal  # a double root: Phi_q vanishes where it holds

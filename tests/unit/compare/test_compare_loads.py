@@ -100,6 +100,7 @@ def test_that_aliases_of_a_slip_are_named(pendulum):
     assert kinds(half, "M[x_bob, x_bob]")[0][1] == "M is half what it should be."
 
 
+@pytest.mark.slow
 def test_that_numbers_may_stand_for_parameters(pendulum):
     with_numbers = pendulum.Q.subs(sympy.Symbol("k"), 50)
     report = kc.compare(pendulum, Q=with_numbers)

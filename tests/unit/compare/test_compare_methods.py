@@ -32,6 +32,7 @@ def test_that_methods_of_a_transmission_are_those_of_itself(name: str) -> None:
     assert [item.kind for item in report.conventions] == ["du/dx", "du/dx"]
 
 
+@pytest.mark.slow
 def test_that_a_method_of_another_mechanism_is_judged_at_the_same_parameters() -> None:
     f = function("four_bar")
     longer = kc.transmission(models.crank_rocker(c=0.09), ["motor"], ["rocker.phi"])

@@ -61,6 +61,7 @@ def test_that_every_case_has_a_meaning() -> None:
     assert set(MEANT) == set(CASES)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", MEANT)
 def test_that_a_case_of_the_museum_is_found_and_named_as_its_fix_says(name: str) -> None:
     case = CASES[name]

@@ -63,6 +63,7 @@ def test_positions_for_velocities_in_the_translational_joint(joint_types: Models
         assert {entry.row for entry in report.different} == {"K.normal"}
 
 
+@pytest.mark.slow
 def test_the_square_of_a_difference_of_squares(joint_types: Models) -> None:
     model = joint_types["Translational"]()
     normal, parallel = model.gamma
@@ -73,6 +74,7 @@ def test_the_square_of_a_difference_of_squares(joint_types: Models) -> None:
         assert "w_j^2 - w_i^2 for (w_j - w_i)^2" in named(report)
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     "kind", ["Translational", "RackAndPinion", "CamFlatFollower", "Revolute", "PointFollower"]
 )
@@ -82,6 +84,7 @@ def test_rows_of_gamma_that_are_swapped(kind: str, joint_types: Models) -> None:
     assert named(report) == {"rows swapped"}
 
 
+@pytest.mark.slow
 def test_two_of_three_rows_that_are_swapped(joint_types: Models) -> None:
     model = joint_types["CamFollower"]()
     report = beside_right(model, gamma=model.gamma[[0, 2, 1], :])

@@ -62,6 +62,7 @@ def test_that_a_sign_of_phi_q_nu_or_gamma_alone_is_a_mistake(
             assert (flagged(report), report.equal) == (expected, False)
 
 
+@pytest.mark.every(5)
 def test_that_nu_and_gamma_need_not_have_phi_beside_them(
     joint: kc.Mechanism, reference: Reference
 ) -> None:
@@ -74,6 +75,7 @@ def test_that_nu_and_gamma_need_not_have_phi_beside_them(
                 assert flagged(kc.compare(reference, **beside, **{name: wrong})) == expected
 
 
+@pytest.mark.every(5)
 def test_that_a_sign_of_the_whole_row_is_a_convention(
     joint: kc.Mechanism, reference: Reference
 ) -> None:
@@ -89,6 +91,7 @@ def test_that_a_sign_of_the_whole_row_is_a_convention(
             assert not strict.equal
 
 
+@pytest.mark.every(5)
 def test_that_gamma_must_follow_a_row_of_phi_q_that_is_flipped(
     joint: kc.Mechanism, reference: Reference
 ) -> None:
@@ -99,6 +102,7 @@ def test_that_gamma_must_follow_a_row_of_phi_q_that_is_flipped(
     assert {row for _, row in flagged(report)} == {reference.equations[k] for k in rows}
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("name", "stated", "kind"),
     [("nu", "Phi_t", "driver's rate reversed"), ("gamma", "left side", "whole sign")],

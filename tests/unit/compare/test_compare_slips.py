@@ -66,6 +66,7 @@ def model_of(name: str) -> kc.Mechanism | kc.ConstraintSystem:
     return m
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("slip", SLIPS, ids=[f"{x['quantity']}, {x['kind']}" for x in SLIPS])
 def test_that_a_slip_typed_by_hand_is_called_what_it_is(slip: dict[str, Any]) -> None:
     model, quantity = model_of(slip["model"]), slip["quantity"]

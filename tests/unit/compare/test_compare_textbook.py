@@ -441,6 +441,7 @@ def checked(kind: str, formulas: dict[str, Any], folder: Path) -> Report:
     return report
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("kind", FORMULAS)
 def test_that_a_textbook_formula_is_equal(kind: str, tmp_path: Path) -> None:
     report = checked(kind, FORMULAS[kind], tmp_path)

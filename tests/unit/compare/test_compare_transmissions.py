@@ -119,6 +119,7 @@ RIGHT: list[tuple[str, dict[str, Any]]] = [
 ]  # fmt: skip
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(("name", "given"), RIGHT)
 def test_that_no_right_formula_is_called_wrong(name: str, given: dict[str, Any]) -> None:
     report = compared(name, **given)
@@ -179,6 +180,7 @@ WRONG: list[tuple[str, dict[str, Any], tuple[str, ...]]] = [
 ]  # fmt: skip
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(("name", "given", "words"), WRONG)
 def test_that_a_slip_is_found_and_named(
     name: str, given: dict[str, Any], words: tuple[str, ...]

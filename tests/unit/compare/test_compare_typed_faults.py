@@ -107,6 +107,7 @@ TYPED: list[tuple[Any, str, dict[str, str], list[str]]] = [
 ]  # fmt: skip
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("model", "quantity", "changes", "meant"),
     TYPED,

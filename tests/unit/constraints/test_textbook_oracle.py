@@ -17,6 +17,7 @@ TOLERANCE = 1e-12  # both sides are exact to rounding
 STEP = 1e-30  # of the complex step: no subtraction, so no cancellation
 
 
+@pytest.mark.every(5)
 def test_that_the_emitted_module_agrees_at_single_points(case: Any) -> None:
     assert case.deviation(case.module.kinematics) < TOLERANCE
 

@@ -138,6 +138,7 @@ def joint_of(figures: Figures, name: str) -> Any:
     return next(item for item in figures.evaluation.system.constraints if item.name == name)
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("name", sorted(CONSTRAINTS.keys() - {"Normalization"}))
 def test_that_each_type_in_space_has_the_vectors_of_its_equation(
     name: str, in_space: Figures

@@ -158,6 +158,7 @@ def test_that_a_notebook_computes_the_numbers_of_the_page(example_named: Any) ->
     assert names["correction"].shape == (9,)
 
 
+@pytest.mark.slow
 def test_that_slides_have_one_constraint_each(gallery: Any) -> None:
     text = kc.derivation(gallery).to_slides()
     page = Page(text)

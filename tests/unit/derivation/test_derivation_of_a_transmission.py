@@ -115,6 +115,7 @@ def case(request: pytest.FixtureRequest) -> Any:
     return kc.transmission(model, inputs, outputs), page, model, inputs
 
 
+@pytest.mark.every(5)
 def test_that_every_line_holds(case: Any) -> None:
     f, page, model, inputs = case
     # Derivatives of outputs too long for a line are in a table; the others are known.

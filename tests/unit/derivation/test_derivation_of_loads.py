@@ -99,6 +99,7 @@ def test_that_a_mechanism_without_loads_has_no_such_part():
     assert "loads" not in [item.anchor for item in kc.derivation(bare).sections]
 
 
+@pytest.mark.slow
 def test_that_a_couple_about_a_hinge_reads_as_one():
     """In space torque and rate have names, and the root of friction is one."""
     m = spatial.Mechanism("hinge")

@@ -124,6 +124,7 @@ scalars: Any = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(scalars)
 @settings(max_examples=200)
 def test_that_a_scalar_is_differentiated_along_a_direction(expression: Scalar) -> None:

@@ -140,6 +140,7 @@ def test_the_straightest_hoeken_linkage():
     assert "straightness of P" in found.to_text()
 
 
+@pytest.mark.slow
 def test_a_circle_beside_a_time_ratio_and_a_dwell_that_is_far():
     """B goes round A with the crank, whose length is found; the rocker rests nowhere."""
     m = fourbar()
@@ -275,6 +276,7 @@ def test_active_limit_holds_and_costs_as_little_as_possible(minimizer):
     assert found.error <= errors.min() * (1 + 1e-3)
 
 
+@pytest.mark.slow
 def test_transmission_angle_is_kept_over_the_whole_turn():
     m = fourbar(r1=4.0, r2=1.5, r3=4.0, r4=3.0)
     at = [0.5, 1.2]
@@ -467,6 +469,7 @@ def three_cranks():
     return m
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::kincompile.errors.RedundantConstraintWarning")
 def test_redundant_equations_are_fitted_as_others_are():
     t = np.linspace(0, 6, 7)  # at zero two of the cranks are a flat parallelogram

@@ -80,6 +80,7 @@ def four_bar_potential(side, k):
     return potential
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [100, *(pytest.param(k, marks=pytest.mark.slow) for k in (20, 400))])
 def test_that_both_ways_of_the_slider_are_found(k):
     found = kc.equilibria(kc.compile(slider_crank(k)))

@@ -100,6 +100,7 @@ def test_that_a_balanced_rod_is_in_neutral_equilibrium_everywhere():
         assert np.isinf(found.compliance("rod.phi")).all()
 
 
+@pytest.mark.slow
 def test_the_equilibria_of_a_toggle_and_where_it_snaps_through():
     found = kc.equilibria(kc.compile(toggle()))
     heights = [item["knee.y"][0] for item in found]
@@ -139,6 +140,7 @@ def test_that_a_near_equilibrium_of_any_kind_is_found_on_request():
     assert kc.equilibrium(module, guess={"knee.y": 0.13})["knee.y"][0] > 0.2
 
 
+@pytest.mark.slow
 def test_that_a_chain_hangs_as_known_and_bears_its_load():
     found = kc.equilibrium(kc.compile(chain()))
     below = -np.pi / 2

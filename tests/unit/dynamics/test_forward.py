@@ -119,6 +119,7 @@ def test_that_the_double_pendulum_moves_as_its_taylor_series(method, error):
     np.testing.assert_allclose(energy, -4.905, atol=10 * error)
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("name", "target"),
     [

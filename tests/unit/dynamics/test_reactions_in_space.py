@@ -130,6 +130,7 @@ def slider_crank(turn):
     return m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", TURNS)
 def test_that_a_spatial_slider_crank_bears_what_its_free_bodies_say(turn):
     m = slider_crank(turn)

@@ -52,6 +52,7 @@ def test_that_the_jacobian_is_that_of_complex_steps(model):
     np.testing.assert_allclose(jacobian, expected, rtol=1e-9, atol=1e-11 * np.abs(found).max())
 
 
+@pytest.mark.slow
 def test_that_a_stiff_spring_takes_few_evaluations():
     """Beside SciPy's own differences, on the same equations; all find the pendulum of two rods."""
     equations, module = equations_of(sprung())

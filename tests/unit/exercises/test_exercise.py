@@ -211,6 +211,7 @@ def test_that_what_cannot_be_read_costs_its_own_blank(four_bar: Path) -> None:
     assert row["reasons"] == "B5: not filled"
 
 
+@pytest.mark.slow
 def test_that_what_surrounds_an_answer_does_not_matter(four_bar: Path) -> None:
     fill(four_bar, "03", {"B1": lambda x: f"{x};", "B2": lambda x: f"{x}  % from the page"})
     path = four_bar / "students" / "03" / "hand_in.txt"
@@ -218,6 +219,7 @@ def test_that_what_surrounds_an_answer_does_not_matter(four_bar: Path) -> None:
     assert rows_of(four_bar)["03"]["points"] == "9"
 
 
+@pytest.mark.slow
 def test_that_a_line_that_is_not_read_is_told(four_bar: Path) -> None:
     fill(four_bar, "04", {"B9": lambda _: "1 +"})
     path = four_bar / "students" / "04" / "hand_in.txt"
@@ -230,6 +232,7 @@ def test_that_a_line_that_is_not_read_is_told(four_bar: Path) -> None:
     assert "row 1, column" not in row["not read"]  # of a matrix that no student has seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
@@ -254,6 +257,7 @@ def test_that_a_hand_in_file_that_is_no_hand_in_has_no_points(
     assert row["reasons"].count("nothing handed in") <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="links and pipes are those of POSIX")
 def test_that_what_is_no_file_of_ones_own_is_not_read(four_bar: Path) -> None:
     path = four_bar / "students" / "02" / "hand_in.txt"
@@ -277,6 +281,7 @@ def test_that_what_is_no_file_of_ones_own_is_not_read(four_bar: Path) -> None:
     path.rmdir()
 
 
+@pytest.mark.slow
 def test_that_one_student_does_not_stop_the_others(four_bar: Path, monkeypatch: Any) -> None:
     fill(four_bar, "01", {})
     fill(four_bar, "02", {})
@@ -355,6 +360,7 @@ def test_that_a_reason_commands_no_terminal_and_no_spreadsheet(four_bar: Path) -
     assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@"))]
 
 
+@pytest.mark.slow
 def test_that_zeros_have_no_points(four_bar: Path) -> None:
     a = "phi_crank"
     zero = {

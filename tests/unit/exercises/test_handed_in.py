@@ -96,6 +96,7 @@ def marked(folder: Path, *options: str) -> dict[str, str]:
     return next(csv.DictReader(StringIO(done.stdout)))
 
 
+@pytest.mark.slow
 def test_that_marks_say_what_was_rounded_and_what_cannot_be_read(tmp_path: Path) -> None:
     """The variant of this seed has the length 2.86875."""
     folder = kc.exercise(MODEL, 1, 1).write(tmp_path / "kit")

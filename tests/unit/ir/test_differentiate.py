@@ -41,6 +41,7 @@ def value(graph: Graph, node: int, at: dict[str, float]) -> float:
         return float(run(graph.nodes, {k: np.float64(v) for k, v in at.items()}, {})[node])
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     "function",
     [item for item in SMOOTH if item not in (sympy.Piecewise, PeriodicSpline, sympy.atan2)],

@@ -153,6 +153,7 @@ def read(cls, row, names=None):
     return reader.made(cls, row, ("parts", 0), names or {}), reader.problems
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("name", WRITTEN)
 @given(data=st.data())
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -170,6 +171,7 @@ DRAWN = ("drive", "spatial_drive", "spatial_rod", "span", "deviation", "sequence
 """What is not written as it was read: a motion is its formula, a drawing its bodies."""
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("name", sorted(WRITTEN.keys() - DRAWN))
 @given(data=st.data())
 @settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -428,6 +428,7 @@ class Terminal(io.StringIO):
         return True
 
 
+@pytest.mark.slow
 def test_that_a_slow_compiler_is_mentioned_once_while_it_runs(compiler, monkeypatch):
     """On a terminal alone, and not where the library is there already."""
     monkeypatch.setattr(c_library, "PATIENCE", 0.05)

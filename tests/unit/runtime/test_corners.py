@@ -44,6 +44,7 @@ def module(request):
     return kc.compile(press(corners=True), target=request.param)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("points", "method"), [(26, None), (251, None), (251, "march")])
 def test_that_a_corner_has_no_acceleration_and_all_else_is_right(module, points, method):
     t = np.linspace(0, 2.5, points)

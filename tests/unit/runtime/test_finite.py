@@ -23,6 +23,7 @@ def modules(example_named, quick_compiler):
     return {"compiled": example.native, "grouped": grouped, "": example.module}
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("grid", GRIDS)
 @pytest.mark.parametrize("way", WAYS)
 def test_times_may_repeat(modules, way, grid):

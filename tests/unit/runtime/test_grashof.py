@@ -132,6 +132,7 @@ def test_that_it_is_written(tmp_path):
     assert item["links"]["rocker"] == pytest.approx(3.5)
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("kind", [*ROLES, "triple-rocker"])
 def test_that_a_fit_keeps_the_type(kind):
     """A margin beyond that of the model, which the same angle of the rocker allows: it is met."""

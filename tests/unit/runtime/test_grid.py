@@ -12,6 +12,7 @@ def both(module, t, **options):
     return (kc.solve(module, t, method=method, **options) for method in ("grid", "march"))
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("points", [33, 257, pytest.param(2000, marks=pytest.mark.slow)])
 def test_every_example_has_the_same_motion_by_both_methods(example, points):
     ours, theirs = both(example.module, np.linspace(0, example.model.end, points))

@@ -265,6 +265,7 @@ def test_what_cannot_be_measured():
         kc.solve(kc.compile(m), [0, 1]).measures()
 
 
+@pytest.mark.slow
 def test_measures_of_variants_together_are_those_of_each_alone(monkeypatch):
     starts = np.linspace(0, 3, 7)
     several = slider_crank(1.3, 53, start=starts)  # pull has no rate, and speed turns in corners

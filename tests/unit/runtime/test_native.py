@@ -55,6 +55,7 @@ def test_every_function_agrees(example, shape):
     assert_functions_agree(example.native, example.module, q, q_dot, t if shape else 0.7)
 
 
+@pytest.mark.every(5)
 def test_the_layout_with_the_batch_last_agrees(example):
     q, q_dot, t = states(example.module, 70)
     arguments = np.ascontiguousarray(q.T), np.ascontiguousarray(q_dot.T), t
@@ -372,6 +373,7 @@ def test_steps_towards_a_lock_up_are_as_long_as_velocities_allow(four_bar):
     assert found.iterations[locked].max() <= 100  # 158 and more where steps are halved and doubled
 
 
+@pytest.mark.every(5)
 def test_variants_of_every_example(example):
     n = example.module
     rng = np.random.default_rng(4)
@@ -411,6 +413,7 @@ def test_batches_that_are_written_past_the_caches_agree(four_bar, points):
     assert_same(native.kinematics_batch_last(*last, out=found), expected)
 
 
+@pytest.mark.slow
 def test_that_all_quantities_in_one_go_are_compiled_on_request(
     monkeypatch, tmp_path, quick_compiler, example_named
 ):

@@ -111,6 +111,7 @@ def test_safeguards_rescue_a_bad_guess(four_bar, guess, monkeypatch):
     assert newton(four_bar, 0, guess).status is not Status.CONVERGED
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("turns", [-2, -1, 1, 3])
 @pytest.mark.parametrize("longer", [0.99, 1.0, 1.01])
 def test_that_a_driven_angle_may_be_guessed_whole_turns_away(four_bar, turns, longer):

@@ -20,6 +20,7 @@ def run():
     return names, "\n".join(printed)
 
 
+@pytest.mark.slow
 def test_that_the_table_is_what_is_printed(run):
     (text,) = re.findall(r"^```text\n(.*?)^```", PAGE, re.M | re.S)
     assert run[1].splitlines() == text.splitlines()

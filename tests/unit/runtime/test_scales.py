@@ -45,6 +45,7 @@ WAYS: dict[str, tuple[str, int, dict[str, Any]]] = {
 }
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("way", WAYS)
 def test_no_unit_of_length_is_judged_otherwise_or_takes_more_work(modules, way, size):

@@ -193,6 +193,7 @@ def test_that_all_examples_agree_with_complex_steps(example):
     assert_complex_steps(solution, kc.sensitivities(solution, names))
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("seed", range(12))
 def test_that_random_linkages_agree_with_complex_steps(seed):
     rng = np.random.default_rng(seed)

@@ -50,6 +50,7 @@ def on_text(module, lanes, name, p, guesses, *given):
     return written["q"][:, 0], said["status"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", "rssr"])
 def test_that_attempts_come_near_where_those_on_arrays_do(example_named, name, quick_compiler):
     example = example_named(name)

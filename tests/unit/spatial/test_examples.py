@@ -286,6 +286,7 @@ def position(found: Any, body: str) -> Any:
     return np.column_stack([found[f"{axis}_{body}"] for axis in "xyz"])
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", NAMES)
 def test_that_a_turned_copy_moves_alike(name: str) -> None:
     rng = np.random.default_rng(sum(map(ord, name)))

@@ -145,6 +145,7 @@ def test_that_rates_of_points_and_spins_have_names() -> None:
     assert np.abs(found["end.x_dot"]).min() > 0.1
 
 
+@pytest.mark.slow
 def test_that_a_planar_file_loads_no_spatial_code() -> None:
     import subprocess
     import sys

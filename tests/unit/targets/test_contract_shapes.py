@@ -53,6 +53,7 @@ def point_by_point(module: Any, name: str, given: list[Any], batch: tuple[int, .
     return np.array(found).reshape(*batch, *np.shape(found[0])) if found else None
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("shapes", fitting()[::5], ids=str)
 def test_that_arguments_broadcast_like_a_gufunc(rich: Any, shapes: Any) -> None:
     for name, core in SINGLE.items():

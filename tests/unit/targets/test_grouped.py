@@ -47,6 +47,7 @@ def both(model):
     return kc.compile(model, form="grouped"), kc.compile(model, form="inline")
 
 
+@pytest.mark.every(5)
 def test_every_example_has_the_same_numbers_in_both_forms(example):
     grouped, written_out = both(example.model)
     rng = np.random.default_rng(7)

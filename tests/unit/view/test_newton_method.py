@@ -85,6 +85,7 @@ def test_that_singular_values_are_numpys(tmp_path, shape):
     np.testing.assert_allclose(np.linalg.norm(matrix @ directions.T, axis=0), sizes, atol=1e-14)
 
 
+@pytest.mark.every(5)
 @node
 def test_that_iterates_are_those_of_the_runtime(tmp_path, example):
     module, t = example.module, 0.3

@@ -39,6 +39,7 @@ def pendulum(name="pendulum", driver=kc.t, **grid):
     return m
 
 
+@pytest.mark.every(5)
 def test_that_a_page_has_the_numbers_of_the_solution(example):
     page = kc.page(example.model, example.solution)
     data, arrays = data_of(page.html)

@@ -52,6 +52,7 @@ def as_array(points):
     return np.array([point or (math.nan, math.nan) for point in points], dtype=float)
 
 
+@pytest.mark.every(5)
 def test_that_the_page_draws_the_points_that_python_draws(example, in_the_page):
     q = example.solution.q[example.solution.good]
     drawn = drawing(example.model, q=q)
