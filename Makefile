@@ -61,8 +61,8 @@ $(TEST_READY): $(DEMO_READY)
 	@touch $@
 
 $(PAGES_READY): $(TEST_READY)
-	@echo "Installing what reads notebooks and drives a browser into $(VENV)"
-	@$(PIP) --editable '.[pages]'
+	@echo "Installing what reads notebooks, drives a browser and grades courses into $(VENV)"
+	@$(PIP) --editable '.[pages,courses]'
 	@touch $@
 
 $(LINT_READY): $(TEST_READY) .ci/page/package-lock.json

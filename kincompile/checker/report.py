@@ -205,7 +205,7 @@ class Report(Shown):
             for row, entries in self.rows(quantity).items()
         ]
         output = "\n".join([self.summary, *(item.text for item in self.conventions)])
-        return _json({"output": output, "visibility": "visible", "tests": tests})
+        return gradescope_json(output, tests)
 
 
 def _at_a_state(entry: ComparedEntry, reveal: bool) -> str:
@@ -222,14 +222,24 @@ def _test(name: str, entries: list[ComparedEntry], reveal: bool) -> dict[str, An
     """Return the test of one row: a point where all entries are accepted."""
     is_wrong = not all(entry.accepted for entry in entries)
     lines = [line for entry in entries for line in entry.explanation(reveal)]
+    return gradescope_test(name, not is_wrong, "\n".join(lines) or "right")
+
+
+def gradescope_test(name: str, is_right: bool, output: str) -> dict[str, Any]:
+    """Return a test of Gradescope that is worth a point."""
     return {
         "name": name,
-        "score": 0 if is_wrong else 1,
+        "score": 1 if is_right else 0,
         "max_score": 1,
-        "status": "failed" if is_wrong else "passed",
-        "output": "\n".join(lines) or "right",
+        "status": "passed" if is_right else "failed",
+        "output": output,
         "visibility": "visible",
     }
+
+
+def gradescope_json(output: str, tests: list[dict[str, Any]]) -> str:
+    """Return the ``results.json`` of an autograder of Gradescope."""
+    return _json({"output": output, "visibility": "visible", "tests": tests})
 
 
 def _json(data: dict[str, Any]) -> str:

@@ -19,6 +19,12 @@ from kincompile.cli.shared import output_option, read_model
 @click.option("--lengths", is_flag=True, help="Change points and distances given as numbers too.")
 @click.option("--mistakes", is_flag=True, help="Find the mistake: Jacobians with one slip each.")
 @click.option("--exam", is_flag=True, help="Numbered sheets to fill on paper, with numbers.")
+@click.option(
+    "--for",
+    "system",
+    metavar="SYSTEM",
+    help="What the course is taught with: gradescope, moodle, nbgrader, otter or prairielearn.",
+)
 def command(
     model: str,
     output: str,
@@ -28,6 +34,7 @@ def command(
     lengths: bool,
     mistakes: bool,
     exam: bool,
+    system: str | None,
 ) -> None:
     """Write an exercise on MODEL: a page and a hand-in file for each student.
 
@@ -35,7 +42,9 @@ def command(
     same entries of Phi_q and gamma to derive; with --mistakes three Jacobians in each of which an
     entry is wrong, other ones for each student; with --exam sheets with boxes for formulas and
     numbers, all of them to print in students/sheets.html, and a table answers.csv. The folder
-    instructor has the solutions; `kincompile mark` checks what is handed in.
+    instructor has the solutions; `kincompile mark` checks what is handed in. With --for a course's
+    own system marks: a notebook for otter or nbgrader, a question for PrairieLearn, questions for
+    Moodle (STACK, and with --exam numbers), an autograder for Gradescope.
     """
     made = kc.exercise(
         read_model(model),
@@ -46,5 +55,5 @@ def command(
         mistakes=mistakes,
         exam=exam,
     )
-    written = made.write(Path(output))
+    written = made.write(Path(output), system)
     click.echo(f"Wrote {written}: {made.sizes}", err=True)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from kincompile.errors import InputError
 from kincompile.exercises.blanks import PLACE, Blank, choose_blanks
 from kincompile.exercises.sheet import sheet, solutions, together
+from kincompile.exercises.systems import files_for
 from kincompile.exercises.variants import Choices, variants
 from kincompile.model.mechanism import Mechanism
 from kincompile.names import rate
@@ -74,9 +75,21 @@ class ExerciseKit:
         digits = max(2, len(str(len(self.variants))))
         return tuple(f"{k:0{digits}}" for k in range(1, len(self.variants) + 1))
 
-    def files(self) -> dict[str, str]:
-        """Return the text of every file by its path; the same for the same seed."""
-        systems = [item.system() for item in self.variants]
+    @property
+    def systems(self) -> tuple[ConstraintSystem, ...]:
+        """The equations of each student."""
+        return tuple(item.system() for item in self.variants)
+
+    def files(self, system: str | None = None) -> dict[str, str]:
+        """Return the text of every file by its path; the same for the same seed.
+
+        With a system, as for `write`, the files that it takes.
+        """
+        found = self._files()
+        return found if system is None else files_for(system, self, found)
+
+    def _files(self) -> dict[str, str]:
+        systems = self.systems
         found: dict[str, str] = {}
         pages: dict[str, Manuscript] = {}
         states = self.states or (None,) * len(systems)
@@ -110,15 +123,25 @@ class ExerciseKit:
         found[f"{INSTRUCTOR}/{BLANKS}"] = json.dumps(key, indent=1) + "\n"
         return found
 
-    def write(self, folder: str | os.PathLike[str]) -> Path:
+    def write(self, folder: str | os.PathLike[str], system: str | None = None) -> Path:
         """Write the kit to a new folder, whole or not at all, and return the folder.
+
+        Parameters
+        ----------
+        folder
+            What to write.
+        system
+            What the course is taught with: ``"gradescope"``, ``"moodle"``, ``"nbgrader"``,
+            ``"otter"`` or ``"prairielearn"``. None for files that `mark` reads.
 
         Raises
         ------
         InputError
-            If the folder exists and is not empty, or cannot be made.
+            If the folder exists and is not empty, or cannot be made, or there is no such system.
+        UnsupportedError
+            If STACK of Moodle cannot ask for a blank.
         """
-        return write_folder(folder, self.files)
+        return write_folder(folder, lambda: self.files(system))
 
     def _hand_in(self, student: str, system: ConstraintSystem, blanks: Sequence[Blank]) -> str:
         last = system.bodies[0].coordinates[-1] if system.bodies else system.coordinates[0].name

@@ -45,6 +45,9 @@ SECONDS, MOST_MEMORY = 60, 2_000_000_000
 MOST_CHARACTERS = 300
 """Characters of a reason."""
 
+EXACT = Leeway()
+"""No number may be off."""
+
 STOPPED, PLACE_MISSED = "stopped", "another entry named"
 """What marks are besides right, wrong, not filled and not read."""
 
@@ -85,35 +88,47 @@ def mark(
     """
     leeway = Leeway(tolerance, digits)
     target = Path(folder)
-    key = _key(target)
+    key = read_key(target)
     typed = read_roster(target / ANSWERS, key.blanks) if (target / ANSWERS).exists() else {}
     if key.states and not tolerance and digits is None:
         leeway = Leeway(digits=DIGITS)
     found: dict[str, tuple[Mark, ...]] = {}
-    for student, blanks in key.blanks.items():
-        lines, problem = _lines(target / STUDENTS / student / HAND_IN)
+    for student in key.blanks:
+        lines, problem = hand_in_lines(target / STUDENTS / student / HAND_IN)
         lines += [f"{name} = {text}" for name, text in typed.get(student, {}).items() if text]
-        answers, unread = _answers(lines)
-        marks = {
-            item: Mark(item, 0, unread[item.name], UNREAD)
-            if item.name in unread
-            else Mark(item, 0, problem or EMPTY, EMPTY)
-            for item in blanks
-        }
-        if answers:
-            path = target / INSTRUCTOR / MODELS / f"{student}.toml"
-            state = key.states.get(student)
-            work = partial(_student, path, blanks, answers, leeway, state)
-            marks |= within_budget(work, blanks)
-        found[student] = tuple(
-            replace(
-                item,
-                answer=answers.get(item.blank.name, ""),
-                question=key.questions[student].get(item.blank.name, ""),
-            )
-            for item in marks.values()
-        )
+        found[student] = marks_of(target, key, student, lines, problem, leeway)
     return Marks(target, key.name, found)
+
+
+def marks_of(
+    folder: Path,
+    key: Key,
+    student: str,
+    lines: Sequence[str],
+    problem: str = "",
+    leeway: Leeway = EXACT,
+) -> tuple[Mark, ...]:
+    """Return the marks of the lines that a student handed in; the problem is of the whole file."""
+    blanks = key.blanks[student]
+    answers, unread = _answers(lines)
+    marks = {
+        item: Mark(item, 0, unread[item.name], UNREAD)
+        if item.name in unread
+        else Mark(item, 0, problem or EMPTY, EMPTY)
+        for item in blanks
+    }
+    if answers:
+        path = folder / INSTRUCTOR / MODELS / f"{student}.toml"
+        work = partial(_student, path, blanks, answers, leeway, key.states.get(student))
+        marks |= within_budget(work, blanks)
+    return tuple(
+        replace(
+            item,
+            answer=answers.get(item.blank.name, ""),
+            question=key.questions[student].get(item.blank.name, ""),
+        )
+        for item in marks.values()
+    )
 
 
 def _student(
@@ -237,7 +252,7 @@ def _memory() -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class _Key:
+class Key:
     """What an exercise asks each student: blanks, their questions, the states of an exam."""
 
     name: str
@@ -246,7 +261,7 @@ class _Key:
     states: dict[str, State]
 
 
-def _key(folder: Path) -> _Key:
+def read_key(folder: Path) -> Key:
     """Return what an exercise asks."""
     path = folder / INSTRUCTOR / BLANKS
     try:
@@ -287,10 +302,10 @@ def _key(folder: Path) -> _Key:
             f"{path} has no blanks of {listed(without)}; write the exercise again with its seed"
         )
     blanks = {student: found[student] for student in students}
-    return _Key(name, blanks, questions, states)
+    return Key(name, blanks, questions, states)
 
 
-def _lines(path: Path) -> tuple[list[str], str]:
+def hand_in_lines(path: Path) -> tuple[list[str], str]:
     """Return the lines of a hand-in file, and what is wrong with the whole file."""
     if not os.path.lexists(path):
         return [], "nothing handed in"

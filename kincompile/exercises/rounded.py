@@ -73,7 +73,7 @@ class Leeway:
         """Return whether a number may stand for the right one."""
         off = abs(number - right)
         return off <= self.tolerance * abs(right) or (
-            self.digits is not None and off <= _half_unit(right, self.digits) * SLACK
+            self.digits is not None and off <= half_unit(right, self.digits) * SLACK
         )
 
     @property
@@ -82,7 +82,7 @@ class Leeway:
         return f"to {self.digits} digits" if self.digits else f"within {self.tolerance:g}"
 
 
-def _half_unit(value: float, digits: int) -> float:
+def half_unit(value: float, digits: int) -> float:
     """Return half a unit of a significant digit of a value, 0 of 0."""
     return 0.5 * 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1) if value else 0.0
 
