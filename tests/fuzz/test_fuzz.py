@@ -129,6 +129,33 @@ def test_that_a_large_corpus_is_refused_or_read(tmp_path, seed):
 
 
 @pytest.mark.slow
+def test_that_broken_robots_are_refused_or_read(tmp_path):
+    """What replaces bytes, and values in quotes; MuJoCo is loaded by the good files."""
+    rng, data = random.Random(1), Path(__file__).parents[1] / "data" / "robots"
+    good = [data / "5bar_linkage_iso3d.urdf", data / "welded_four_bar.xml"]
+    for path in good:
+        kc.read(path)
+    verdicts = set()
+    for number in range(160):
+        source = good[number % 2]
+        path, text = tmp_path / f"fuzz{source.suffix}", source.read_text(encoding="utf-8")
+        change = CORPUS["with_hostile_formula"] if number % 4 < 2 else CORPUS["mutated"]
+        changed = change(rng, text if number % 4 < 2 else text.encode())
+        path.write_bytes(
+            changed if isinstance(changed, bytes) else changed.encode("utf-8", "replace")
+        )
+        problems: tuple[str, ...] = ()
+        with watched():
+            try:
+                kc.read(path)
+            except kc.ModelError as error:
+                problems = error.problems
+        verdicts.add("refused" if problems else "read")
+        assert [problem for problem in problems[:49] if str(path) not in problem] == []
+    assert verdicts == {"read", "refused"}
+
+
+@pytest.mark.slow
 def test_that_3000_bodies_are_read_within_the_limit(tmp_path):
     m = kc.Mechanism("chain")
     a = m.parameter("a", 1.0)

@@ -23,7 +23,7 @@ from kincompile.files.robots.robot import (
     order_tree,
     placement,
 )
-from kincompile.files.robots.xml_text import Element, XmlReader, read_xml
+from kincompile.files.robots.xml_text import LARGEST, Element, XmlReader, read_xml
 from kincompile.names import escaped, shown
 
 if TYPE_CHECKING:
@@ -123,6 +123,11 @@ class _MjcfReader(XmlReader):
         """Refuse macros and plugins, and note motors."""
         if element.tag in REFUSED:
             self.problem(element.line, f"<{element.tag}> is not read; write out what it stands for")
+        for key, value in element.attributes.items():
+            for word in value.split():
+                if _is_wild(word):
+                    text = f"{key} of <{element.tag}> has {shown(word)}: give numbers up to 1e9"
+                    self.problem(element.line, text)
         for child in element.children:
             if element.tag == "actuator" and "joint" in child.attributes:
                 self._motors.append(child.attributes["joint"])
@@ -237,6 +242,14 @@ class _MjcfReader(XmlReader):
         axes = np.eye(3)[2], np.eye(3)[2]
         joint = "spherical" if kind == CONNECT else "fixed"
         self._robot.closures.append(Closure(name, joint, (links[0], links[1]), (a, b), axes, line))
+
+
+def _is_wild(word: str) -> bool:
+    """Return whether a word is NaN, infinite, or a number beyond what robots have."""
+    try:
+        return not abs(float(word)) <= LARGEST
+    except ValueError:
+        return False
 
 
 def _matrix(quaternion: Array) -> Array:

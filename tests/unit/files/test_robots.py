@@ -12,6 +12,9 @@ from scipy.spatial.transform import Rotation
 import kincompile as kc
 from kincompile import spatial
 from kincompile.cli import cli
+from kincompile.files.robots.closing import Tree, led
+from kincompile.files.robots.urdf import read_urdf
+from kincompile.files.robots.xml_text import read_xml
 
 DATA = Path(__file__).parents[2] / "data" / "robots"
 SMALL, LARGE = ["5bar_linkage_iso3d", "welded_four_bar"], [
@@ -162,14 +165,16 @@ def drawn_angle(m: spatial.Mechanism, link: str) -> float:
 
 
 @pytest.mark.filterwarnings(WARNED)
-@pytest.mark.parametrize(("limits", "which"), [((0.1, 3), 1), ((-3, -0.1), 0)])
+@pytest.mark.parametrize(("limits", "which"), [((0.1, 3), 1), ((-3, -0.6), 0)])
 def test_that_limits_choose_among_assemblies(
     tmp_path: Path, limits: tuple[float, float], which: int
 ) -> None:
-    m = model(tmp_path, FOUR_BAR.format(-2, 2, *limits), motors=["crank"])
+    """The rocker is turned by 0.4 at zero, so that the nearest assembly is that above."""
+    text = FOUR_BAR.format(-2, 2, *limits).replace('"4 0 0"', '"4 0 0" rpy="0 0 0.4"')
+    m = model(tmp_path, text, motors=["crank"])
     expected = rocker_angles(m.parameters[0].default)[which]
     assert drawn_angle(m, "rocker") == pytest.approx(expected, abs=1e-9)
-    assert limits[0] < expected < limits[1]
+    assert limits[0] < expected - 0.4 < limits[1]
 
 
 @pytest.mark.filterwarnings(WARNED)
@@ -185,6 +190,31 @@ def test_that_motors_are_led_to_the_pose_without_a_jump(tmp_path: Path) -> None:
     assert turn[0].as_rotvec()[2] == pytest.approx(rocker_angles(3.6)[branch], abs=1e-9)
     with pytest.raises(kc.ModelError, match="its motors cannot be led to the values of the pose"):
         model(tmp_path, text, motors=["rocker"], pose={"rocker": 0.0, "knee": 1.0})
+
+
+@pytest.mark.parametrize("goal", [-2.8, -0.5, 1.5, 3.4, 6.0])
+def test_that_the_way_of_the_motors_stays_on_its_branch(tmp_path: Path, goal: float) -> None:
+    path = tmp_path / "robot.urdf"
+    tree = Tree(read_urdf(path, read_xml(path, FOUR_BAR.format(-9, 9, -4, 4).encode())))
+    for branch in (0, 1):
+        rocker = rocker_angles(0.3)[branch]
+        pin = 4 + 3 * np.exp(1j * rocker) - np.exp(0.3j)
+        begin = {"crank": 0.3, "knee": np.angle(pin) - 0.3, "rocker": rocker}
+        x = np.array([begin[name] for name in tree.names()])
+        assert tree.missed(x) < 1e-12
+        found, done = led(tree, x, {"crank": goal})
+        assert done == 1
+        turned = found[tree.places["rocker"]][0] - rocker_angles(goal)[branch]
+        assert np.exp(1j * turned) == pytest.approx(1, abs=1e-9)
+
+
+def test_that_axes_that_point_the_other_way_do_not_close_a_hinge(tmp_path: Path) -> None:
+    """A link that is turned over about x by half a turn, and is to lie as at first."""
+    loop = '<loop type="revolute"><predecessor link="base"/><successor link="a"/>'
+    text = GOOD.replace('axis xyz="0 0 2"', 'axis xyz="1 0 0"')
+    text = text.replace("</robot>", f'{loop}<axis xyz="0 0 1"/></loop></robot>')
+    m = model(tmp_path, text, motors=["second"], pose={"first": np.pi})
+    assert abs(float(m.bodies[0].guess[3])) == pytest.approx(1, abs=1e-12)
 
 
 def test_that_limits_that_are_left_and_changed_names_are_said(
@@ -285,7 +315,7 @@ def test_that_a_fault_of_a_sidecar_is_named_with_its_line(tmp_path: Path, case: 
 
 def test_what_is_said_of_motors(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     mimic = TREE.format("continuous", '<mimic joint="first"/>')
-    m = model(tmp_path, mimic, "name_mot: [first, second]\nclosed_loop: []\n")
+    m = model(tmp_path, mimic, "name_mot: [second, first]\nclosed_loop: []\n")
     assert [x.name for x in m.parameters] == ["first"]
     assert "joints that mimic others are no motors: second are left out" in caplog.text
     with pytest.raises(kc.InputError, match=r"motor 'thrd' is no joint of .* It has first, second"):
@@ -329,6 +359,8 @@ def test_mjcf_that_is_refused(tmp_path: Path) -> None:
         (("../secret.xml", "0 0 1", ""), r"line 1: the include '../secret.xml' is outside"),
         (("part.xml", "0 0 1", ""), r"line 1: the include 'part.xml' includes itself"),
         (("good.xml", "0 0 1", bomb), r"line 1: <replicate> is not read"),
+        (("good.xml", "0 0 NaN", ""), r"line 1: axis of <joint> has 'NaN': give numbers up to"),
+        (("good.xml", "0 0 1e99", ""), r"line 1: axis of <joint> has '1e99': give numbers up to"),
         (("good.xml", "0 0", ""), r"robot.xml, line 1: MuJoCo refuses this file: .*axis.*line 1"),
     ):
         path.write_text(MJCF.format(*given))
