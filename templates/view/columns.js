@@ -29,6 +29,7 @@ const columns = {
     const { data } = player;
     const groups = [
       ...ordersOf(['Outputs', 'Rates of outputs', 'Second rates of outputs'], named(data), 'y', data.outputs),
+      { title: 'Four-bars', items: fourBarItems() },
       { title: 'Forces', items: reactions.items() },
       { title: 'Paths', items: stage.points.flatMap(pathItems) },
       { title: 'Points', items: stage.points.flatMap(pointItems) },
@@ -44,10 +45,11 @@ const columns = {
     return this.made.items.get(label) ?? null;
   },
 
-  /* The numbers of a column, computed once a motion. */
-  values(item) {
-    if (!this.kept.has(item.label)) this.kept.set(item.label, item.values());
-    return this.kept.get(item.label);
+  /* The numbers of a column of the motion that is shown, or of a setting; computed once. */
+  values(item, setting = null) {
+    const kept = setting ? setting.columns : this.kept;
+    if (!kept.has(item.label)) kept.set(item.label, setting ? settings.as(setting, () => item.values()) : item.values());
+    return kept.get(item.label);
   },
 };
 
@@ -102,6 +104,28 @@ function pathItems(point) {
     label: isSpatial ? `path of ${name} in ${first}${second}` : `path of ${name}`,
     unit: player.data.lengthUnit, path: [`${first} of ${name}`, `${second} of ${name}`],
   }));
+}
+
+/* How well each driven four-bar transmits, as the outputs transmission_angle and mechanical_advantage are:
+   the angle between coupler and follower, and the rate of the crank by that of the follower. */
+function fourBarItems() {
+  const { four_bars, joints, bodies, frames } = player.data.drawing;
+  const placed = name => joints.find(joint => joint.name === name)?.place;
+  return four_bars.filter(({ links, driven }) => driven && driven === links[1]).flatMap(({ joints: pins, links }) => {
+    const places = pins.map(placed), [crank, follower] = [links[1], links[3]].map(name => frames[bodies.indexOf(name)]);
+    if (!places.every(Boolean) || !crank || !follower) return [];
+    const angle = ({ q }) => {
+      const [a, b, c] = places.slice(1).map(({ frame, point }) => inWorld(q, frame, point)), [u, v] = [a, c].map(x => [x[0] - b[0], x[1] - b[1]]);
+      return Math.atan2(Math.abs(u[0] * v[1] - u[1] * v[0]), u[0] * v[0] + u[1] * v[1]);
+    };
+    const rate = (state, { columns: [, , phi] }) => state.q_dot[phi];
+    const over = number => () => player.states.map(state => (state.isFound ? finite(number(state)) : null));
+    return [
+      { label: `transmission angle at ${pins[2]}`, unit: 'rad', at: angle, values: over(angle) },
+      ...[state => rate(state, crank) / rate(state, follower)].map(at => (
+        { label: `mechanical advantage of ${links[3]}`, unit: '', at, values: over(at) })),
+    ];
+  });
 }
 
 /* A residual of exactly zero has no logarithm. */

@@ -88,7 +88,7 @@ class Pen {
     const isViolated = style.violated && style.violated.has(mark.joint);
     const line = isViolated ? palette.bad : style.ghost ?? palette[look.line] ?? strong;
     const isSolid = look.face !== '' && look.face === look.line;
-    const pale = isViolated ? palette.badTint : style.ghost ? palette.paper : palette[look.face] ?? tint;
+    const pale = isViolated ? palette.badTint : style.ghost ? blended(style.ghost, palette.paper, 0.12) : palette[look.face] ?? tint;
     return { line, face: isSolid ? line : pale };
   }
 

@@ -1,6 +1,6 @@
 'use strict';
 /* The mechanism solved again in the page: parameters that are pulled, what they make of motion,
-   drawing and messages, and a motion that is kept to compare with.
+   drawing and messages.
 
    live.set({ r: 0.12 })  solve again with these values, the others as they are
    live.reset()           back to what the page was made with */
@@ -151,7 +151,6 @@ const live = {
   made: null,  // what of the data depends on the motion, as the page was made
   motion: null,  // the one shown, where the page solved for it; null for the one it was made with
   isChanged: false,  // whether a slider was pulled
-  ghost: null,  // { drawing, arrays }: a motion kept to compare with
 
   get names() {
     return player.data.parameters.map(({ name }) => name);
@@ -178,7 +177,9 @@ const live = {
     this.sliders = parameters.map((parameter, k) => new Slider(
       grid, `slider-${k}`, parameter, value => this.pull(k, value), () => this.writeFragment()));
     this.verdict = document.createElement('output');
-    panel.append(grid, this.buttons(), this.verdict);
+    const kept = document.createElement('div');
+    Object.assign(kept, { id: 'kept', className: 'buttons', role: 'group', ariaLabel: 'Kept settings' });
+    panel.append(grid, this.buttons(), kept, this.verdict);
     const { arrays, status, events, success, message, guessResidual } = player.data;
     this.made = { arrays, status, events, success, message, guessResidual };
     // The first drawing has the very numbers that a Reset gives.
@@ -203,7 +204,7 @@ const live = {
       setTimeout(() => { element.textContent = label; }, 1500);
     };
     button('reset', 'Reset', () => this.reset());
-    button('ghost', 'Keep to compare', element => this.toggleGhost(element));
+    button('keep', 'Keep to compare', () => settings.keep());
     button('link', 'Copy link', copy(() => `${location.href.split('#')[0]}${this.fragment()}`, 'Copy link'));
     button('set', 'Copy as --set', copy(() => this.options(), 'Copy as --set'));
     return bar;
@@ -233,6 +234,7 @@ const live = {
   },
 
   reset() {
+    this.sliders.forEach(slider => slider.rest());
     this.set(Object.fromEntries(this.names.map((name, k) => [name, this.given[k]])));
     this.writeFragment();
   },
@@ -249,6 +251,7 @@ const live = {
     this.motion = this.values.every((value, k) => value === this.given[k]) ? null : this.solved(this.values);
     Object.assign(data, this.made);
     setNumbers(data.drawing, this.values);
+    settings.follow();
     if (this.motion) {
       // What ended it is looked for first: the status of the point says so.
       const event = emitted.solver.explain(this.motion);
@@ -288,23 +291,6 @@ const live = {
   showVerdict() {
     this.verdict.textContent = player.data.message;
     this.verdict.classList.toggle('failed', !player.data.success);
-  },
-
-  /* ---- a motion to compare with ---- */
-
-  toggleGhost(button) {
-    const { drawing, arrays } = player.data;
-    this.ghost = this.ghost ? null : { drawing: structuredClone(drawing), q: arrays.q.slice() };
-    button.textContent = this.ghost ? 'Forget what is kept' : 'Keep to compare';
-    button.setAttribute('aria-pressed', String(this.ghost !== null));
-    player.refresh();
-  },
-
-  drawGhost(ctx, view, palette) {
-    if (!this.ghost) return;
-    const { n, state } = player, q = this.ghost.q.subarray(state.index * n, (state.index + 1) * n);
-    if (!q.every(Number.isFinite)) return;
-    drawShapes(ctx, q, { view, palette, ghost: palette.quiet, alpha: 0.4, drawing: this.ghost.drawing });
   },
 
   /* ---- values in a link and on the command line ---- */

@@ -339,6 +339,12 @@ function fourBarsOf() {
   return player.data.drawing.four_bars.filter(({ lengths }) => Math.min(...lengths) > 0).map(grashofOf);
 }
 
+/** @type {[string, (item: any) => string][]} */
+const GRASHOF = [
+  ['Grashof type', ({ type }) => type], ['shortest', ({ shortest }) => shortest],
+  ['p + q − s − l', ({ margin }) => shortNumber(margin)], ['turns wholly', ({ full }) => full.join(', ') || '–'],
+];
+
 const measures = {
   solved: null,  // the motion whose measures are shown
   within: 0.01,  // part of its stroke by which an output at rest may be off
@@ -365,9 +371,9 @@ const measures = {
   },
 
   /* One table for each output, path and four-bar: [{ name, unit, rows: [title, texts of each motion] }]. */
-  blocks(motions) {
+  blocks(shown) {
     const names = player.data.outputs.map(({ name }) => name), order = named(player.data).map(({ name }) => name);
-    const found = motions.map(measuresOf), [first] = found;
+    const motions = shown.map(item => item.motion), found = motions.map(measuresOf), [first] = found;
     const texts = (k, textOf) => found.map(items => (items[k] ? textOf(items[k]) : '–'));
     const outputs = first.map(({ name, unit }, k) => ({ name, unit, rows: [
       ...MEASURES.map(([title, textOf]) => [title, texts(k, textOf)]),
@@ -381,9 +387,11 @@ const measures = {
       return { name: `path of ${name}`, unit: player.data.outputs[columns[0]].unit,
         rows: PATH_MEASURES.map(([title, textOf]) => [title, each.map(item => (item ? textOf(item) : '–'))]) };
     });
-    const fourBars = fourBarsOf().map(({ name, type, shortest, margin, full }) => ({ name: `four-bar ${name}`, unit: '', rows: [
-      ['Grashof type', [type]], ['shortest', [shortest]], ['p + q − s − l', [shortNumber(margin)]], ['turns wholly', [full.join(', ') || '–']],
-    ] }));
+    const types = shown.map(({ setting }) => (setting ? settings.as(setting, fourBarsOf) : fourBarsOf()));
+    const fourBars = types[0].map(({ name }) => {
+      const own = types.map(list => list.find(item => item.name === name));
+      return { name: `four-bar ${name}`, unit: '', rows: GRASHOF.map(([title, textOf]) => [title, own.map(item => (item ? textOf(item) : '–'))]) };
+    });
     return [...outputs, ...paths, ...fourBars];
   },
 
@@ -399,9 +407,12 @@ const measures = {
     if (motion === this.solved && units.angle === this.angle) return;
     this.solved = motion;
     this.angle = units.angle;
-    this.tables = this.blocks([motion]).map(({ name, unit, rows }) => {
-      const table = tableOf([]);
-      table.tHead.remove();
+    const shown = [{ name: 'now', motion, colour: stage.palette.plot },
+      ...settings.kept.map(setting => ({ ...setting, setting, colour: settings.colourOf(setting) }))];
+    this.tables = this.blocks(shown).map(({ name, unit, rows }) => {
+      const table = tableOf(['', ...shown.map(item => item.name)]);
+      if (shown.length === 1) table.tHead.remove();
+      else shown.forEach(({ colour }, k) => { table.tHead.rows[0].cells[k + 1].style.color = colour; });
       table.createCaption().append(...(name.includes(' ') ? [name] : symbolNodes(name)), unit ? ` [${units.name(unit)}]` : '');
       for (const [title, texts] of rows) table.tBodies[0].insertRow().append(cell(title, 'th'), ...texts.map(text => cell(text)));
       return [name, wide(table)];

@@ -72,6 +72,9 @@ class Plot {
     this.names = [over?.label ?? 't', y.label];
     this.units = [over?.unit ?? 's', y.unit];
     this.labels = this.names.map((name, k) => units.titled(name, this.units[k]));
+    const factors = [units.factor(over?.unit ?? 's'), units.factor(y.unit)];
+    this.others = settings.curves.map(setting => ({ setting, ...Object.fromEntries([['x', over], ['y', y]].map(([axis, column], k) =>
+      [axis, (column ? columns.values(column, setting) : Array.from(player.t)).map(value => value && value * factors[k])])) }));
     this.titles = [over?.title ?? 't', y.title];
     this.shown = this.titles.map((title, k) => units.titled(title, this.units[k]));
   }
@@ -98,11 +101,11 @@ class Plot {
   ranges() {
     const { to } = this.scale = this.isLog ? scalesOf.log : scalesOf.linear;
     // Time is shown whole, also where nothing was found.
-    const x = extentOf(this.x.filter((value, k) => value !== null && (this.isOverTime || this.y[k] !== null)));
+    const all = [this, ...this.others];
+    const x = extentOf(all.flatMap(own => own.x.filter((value, k) => value !== null && (this.isOverTime || own.y[k] !== null))));
     const isZoomed = !this.isPath && plots.range !== null;
     const [from, until] = isZoomed ? plots.range : x;
-    const isSeen = (_, k) => this.x[k] >= from && this.x[k] <= until;
-    const y = extentOf(this.y.filter((value, k) => value !== null && isSeen(value, k)).map(to));
+    const y = extentOf(all.flatMap(own => own.y.filter((value, k) => value !== null && own.x[k] >= from && own.x[k] <= until)).map(to));
     const noise = this.isLog ? 0 : ROUNDING_PART * units.scale(this.units[1]) * units.factor(this.units[1]);
     this.xRange = isZoomed ? [from, until] : this.isPath ? opened(x, noise) : x;
     this.yRange = opened(y, noise);
@@ -142,7 +145,7 @@ class Plot {
     }
     parts.push(text((left + right) / 2, low + 2.6 * type, 'middle', this.shown[0], { fill: palette.ink }));
     parts.push(text(0, 1.1 * type, 'start', this.shown[1], { fill: palette.ink }));
-    parts.push(...this.eventLines(palette), this.curve(palette));
+    parts.push(...this.eventLines(palette), this.curves(palette), ...this.legend(type));
     if (isEmpty) {
       const said = hasMotion() ? 'No numbers were found.' : 'No position was found.';
       parts.push(text((left + right) / 2, (top + low) / 2, 'middle', said, { fill: palette.bad }));
@@ -165,20 +168,36 @@ class Plot {
     return multiples(step, a, b).map(y => [this.py(y), stepText(y, step)]);
   }
 
-  curve(palette) {
+  /* The way of a curve in the plot. */
+  way({ x, y }) {
     const pieces = [];
     let isDown = false;
-    this.y.forEach((y, k) => {
-      const isThere = y !== null && this.x[k] !== null;
-      if (isThere) pieces.push(`${isDown ? 'L' : 'M'}${Math.round(10 * this.px(this.x[k])) / 10} ${Math.round(10 * this.py(y)) / 10}`);
+    y.forEach((value, k) => {
+      const isThere = value !== null && x[k] !== null;
+      if (isThere) pieces.push(`${isDown ? 'L' : 'M'}${Math.round(10 * this.px(x[k])) / 10} ${Math.round(10 * this.py(value)) / 10}`);
       isDown = isThere;
     });
+    return pieces.join('');
+  }
+
+  /* Names of the settings in their colours, where there are others than the one shown. */
+  legend(type) {
+    const { palette } = stage, { right, top } = this.box;
+    if (!this.others.length) return [];
+    const lines = [['now', palette.plot], ...this.others.map(({ setting }) => [setting.name, settings.colourOf(setting)])];
+    return lines.map(([name, fill], k) => svgElement('text', { x: right - 4, y: top + (1.1 + 1.15 * k) * type, 'text-anchor': 'end', class: 'name',
+      fill, stroke: palette.paper, 'stroke-width': 3, 'paint-order': 'stroke' }, name));
+  }
+
+  /* The setting that is shown is in front. */
+  curves(palette) {
     const { left, right, top, low } = this.box, edge = 3;
     const style = { fill: 'none', stroke: palette.plot, 'stroke-width': player.count < 2 ? 6 : 2,
       'stroke-linejoin': 'round', 'stroke-linecap': 'round', transform: `translate(${-left} ${edge - top})` };
     // An svg in an svg cuts off what is outside.
     const frame = svgElement('svg', { x: left, y: top - edge, width: right - left, height: low - top + 2 * edge });
-    frame.append(svgElement('path', { d: pieces.join(''), ...style }));
+    frame.append(...this.others.map(other => svgElement('path', { d: this.way(other), ...style, class: 'other',
+      stroke: settings.colourOf(other.setting), 'stroke-width': 1.5 })), svgElement('path', { d: this.way(this), ...style }));
     return frame;
   }
 
@@ -305,8 +324,10 @@ class Plot {
   /* The numbers that are seen, in the units that are shown. */
   csv() {
     const quoted = text => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
-    const heads = this.isOverTime ? this.labels : ['t [s]', ...this.labels];
-    const rows = this.x.map((x, k) => (this.isOverTime ? [x, this.y[k]] : [player.t[k], x, this.y[k]]));
+    const more = this.others.flatMap(({ setting }) => (this.isOverTime ? this.labels.slice(1) : this.labels).map(label => `${label} (${setting.name})`));
+    const heads = [...(this.isOverTime ? this.labels : ['t [s]', ...this.labels]), ...more];
+    const beside = k => this.others.flatMap(({ x, y }) => (this.isOverTime ? [y[k]] : [x[k], y[k]]));
+    const rows = this.x.map((x, k) => [...(this.isOverTime ? [x, this.y[k]] : [player.t[k], x, this.y[k]]), ...beside(k)]);
     const [from, to] = this.xRange;
     const seen = rows.filter((_, k) => this.isPath || (this.x[k] >= from && this.x[k] <= to));
     return `${[heads.map(quoted), ...seen.map(row => row.map(value => value ?? ''))].map(row => row.join(',')).join('\n')}\n`;
@@ -390,7 +411,7 @@ const plots = {
     label.append('Over ', this.choice);
     const count = columns.groups().flatMap(({ items }) => items).length;
     const find = findBox('Find what to plot', () => count, text => this.list.forEach(plot => plot.fill(plot.choice.value, text)));
-    bar.append(label, find, buttonOf('All', () => this.zoom(null), 'All of the axis'));
+    bar.append(label, ...('reason' in emitted || !player.data.parameters.length ? [] : [settings.familyBox()]), find, buttonOf('All', () => this.zoom(null), 'All of the axis'));
     const more = buttonOf('Another plot', () => this.add(columns.groups()[0].items[0].label));
     more.id = 'another';
     this.parts = [bar, this.holder, more];

@@ -3,7 +3,10 @@
 
    new Slider(holder, id, { name, unit, low, high }, pull, done)
    pull(value)   is called while it is pulled, done() when it is let go
-   show(value)   what it says */
+   show(value)   what it says
+   begin(), rest()   it goes back and forth by itself, or no more */
+
+const SWAY = 6000;  // milliseconds from end to end and back
 
 class Slider {
   constructor(holder, id, { name, unit, low, high }, pull, done) {
@@ -24,9 +27,33 @@ class Slider {
     });
     for (const element of [slider, box]) element.addEventListener('change', done);
     this.row = document.createElement('div');
-    this.row.append(label, box, slider);
+    this.sway = buttonOf('⇄', () => (this.swaying ? this.rest() : this.begin()), `Move ${name} back and forth`);
+    this.sway.ariaPressed = 'false';
+    slider.addEventListener('pointerdown', () => this.rest());
+    this.row.append(label, box, slider, this.sway);
     holder.append(this.row);
     this.reach(low, high);
+  }
+
+  /* Go from end to end and back, from where it is. */
+  begin() {
+    const part = Math.max(0, Math.min(1, (this.value - this.low) / (this.high - this.low)));
+    const from = Math.acos(1 - 2 * part), begin = performance.now(), own = this.swaying = {};
+    this.sway.ariaPressed = 'true';
+    const frame = now => {
+      if (this.swaying !== own) return;
+      const phase = from + 2 * Math.PI * (now - begin) / SWAY;
+      this.pull(+(this.low + (this.high - this.low) * (1 - Math.cos(phase)) / 2).toPrecision(6));
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+  }
+
+  rest() {
+    if (!this.swaying) return;
+    this.swaying = null;
+    this.sway.ariaPressed = 'false';
+    this.done();
   }
 
   /* Take other ends. */

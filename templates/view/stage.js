@@ -5,8 +5,8 @@
    stage.first           extent of the motion that the page was made with: it stays in view
    stage.extent          function that gives what the picture must show
    stage.camera          null where all of it is seen, or { zoom, centre }
-   stage.underlays       functions (ctx, view, palette, state) that draw below: a grid
-   stage.overlays        functions (ctx, view, palette, state) that draw on top: ghosts, measures, poles
+   stage.underlays       functions (ctx, view, palette, state) that draw below: a grid, kept settings
+   stage.overlays        functions (ctx, view, palette, state) that draw on top: measures, poles
    stage.pointer         null, or { down, move, up } that get (world point, event) before hovering;
                          true from `down` keeps the event
    stage.points          what can be pointed at: named points, joints and the origins of bodies
@@ -18,6 +18,7 @@ const PLACES = 1000;  // points of a traced path
 const DOTS = 24;  // equal times that are marked on it
 const APART = 10;  // pixels between them, on the mean
 const ARROW = 0.2;  // part of the canvas that the longest velocity and acceleration take
+const SAME_PLACE = 0.01;  // of a mark's size: two joints on one pin have one arrow
 const CLOSEST = 200;  // largest zoom
 const UPRIGHT = 0.36;  // part of a phone's height that the drawing takes at most
 const CLICK = 4;  // pixels that a pointer may move in a click
@@ -38,6 +39,7 @@ class Stage {
     this.selected = null;  // kept by a click
     this.hovered = null;
     this.showsNames = false;
+    this.arrows = new Set();  // 'velocity', 'acceleration': of all points, as long as it is in
     this.fingers = new Map();  // pointers that are down, and where
     this.forget();
     this.resize();
@@ -81,6 +83,7 @@ class Stage {
     drawShapes(ctx, state.q, style);
     for (const point of this.traced) this.drawPath(point);
     for (const overlay of this.overlays) overlay(ctx, view, palette, state);
+    if (state.isFound && !state.pose) this.drawArrows(state);
     this.drawNames(state);
     const point = this.hovered || this.selected;
     if (point && point.isBody) this.drawOutline(point, state, style);
@@ -155,6 +158,26 @@ class Stage {
     for (const points of areasOf(pen, body.frame)) {
       pen.path(points, true);
       pen.stroke(pen.colours(body.frame)[0], 4);
+    }
+  }
+
+  showArrows(kind, isOn) {
+    this.arrows[isOn ? 'add' : 'delete'](kind);
+  }
+
+  /* Velocities and accelerations of all joints and named points, in one scale for each. */
+  drawArrows(state) {
+    const pen = new Pen(this.ctx, state.q, this, player.data.drawing.size);
+    const length = ARROW * Math.min(this.width, this.height) / this.view.scale;
+    const moving = this.points.filter(({ kind }) => kind !== ORIGIN);
+    for (const kind of this.arrows) {
+      const most = moving.reduce((found, point) => Math.max(found, greatestRates(point)[kind]), 0), taken = [];
+      for (const point of moving) {
+        const place = this.where(point, state), rate = ratesInWorld(state, point.frame, point.point)[kind];
+        if (!(most > 0) || taken.some(other => distanceBetween(other, place) < SAME_PLACE * player.data.drawing.size)) continue;
+        taken.push(place);
+        arrow(pen, this.view.toScreen(place), this.view.toScreen(place.map((x, k) => x + rate[k] * length / most)), this.palette[kind], 2.5);
+      }
     }
   }
 

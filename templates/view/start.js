@@ -233,7 +233,7 @@ function start() {
   showing.connect();
   plots.build(byId('panel-plots'));
   numbers.build(byId('panel-numbers'));
-  byId('tab-measures').hidden = !player.data.outputs.length || 'reason' in emitted;
+  byId('tab-measures').hidden = !(player.data.outputs.length || player.data.drawing.four_bars.length) || 'reason' in emitted;
   measures.build(byId('panel-measures'));
   live.build(byId('live'));
   if (hasBodies) {
@@ -245,7 +245,7 @@ function start() {
     traceLongest();
   }
   newtonPanel(byId('panel-newton'));
-  stage.overlays.push((ctx, view, palette) => live.drawGhost(ctx, view, palette));
+  stage.underlays.push((ctx, view, palette) => settings.draw(ctx, view, palette));
   player.onChange(showState);
   let sizes = '';
   const observer = new ResizeObserver(() => {

@@ -80,6 +80,13 @@ const numbers = {
       row.append(nameCell(name), cell(unit), cell(''), cell(''), cell(''));
       return row;
     });
+    this.ready = columns.all().find(({ title }) => title === 'Four-bars')?.items ?? [];
+    const found = tableOf(['four-bar', 'unit', 'value']);
+    this.transmitted = this.ready.map(({ label, unit }) => {
+      const row = found.tBodies[0].insertRow();
+      row.append(cell(label, 'th'), cell(unit), cell(''));
+      return row;
+    });
     this.equations = tableOf(['constraint', 'type', '|Phi|']);
     this.joints = player.data.drawing.joints.map(({ name, kind, is_driver }) => {
       const row = this.equations.tBodies[0].insertRow();
@@ -89,7 +96,7 @@ const numbers = {
     const named = [[this.rows, player.data.coordinates], [this.observed, player.data.outputs], [this.joints, player.data.drawing.joints]];
     const find = rowFinder('Find in the tables', () => named.flatMap(([rows, items]) => rows.map((row, k) => [`${items[k].name} ${symbolText(items[k].name)}`, row])));
     bar.append(this.at, find, this.copy);
-    panel.append(bar, ...(this.observed.length ? [wide(this.outputs)] : []), wide(this.motion), wide(this.equations));
+    panel.append(bar, ...(this.observed.length ? [wide(this.outputs)] : []), ...(this.ready.length ? [wide(found)] : []), wide(this.motion), wide(this.equations));
   },
 
   update(state) {
@@ -108,6 +115,11 @@ const numbers = {
     const at = state.index * data.outputs.length;
     const order = (name, k) => (state.isFound ? data.arrays[name][at + k] : NaN);
     this.observed.forEach((row, k) => fill(row, data.outputs[k].unit, ['y', 'y_dot', 'y_ddot'].map(name => order(name, k))));
+    this.ready.forEach(({ unit, at }, k) => {
+      const value = state.isFound ? at(state) : NaN;
+      this.transmitted[k].cells[1].textContent = units.name(unit);
+      this.transmitted[k].cells[2].textContent = units.text(value, unit, Math.max(1, Math.abs(value)));
+    });
     this.joints.forEach((row, k) => {
       const value = residualAt(state, k);
       row.cells[2].textContent = value === null ? '–' : value.toExponential(2);

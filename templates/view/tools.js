@@ -124,6 +124,8 @@ const tools = {
     };
     pressed('names', isOn => { stage.showsNames = isOn; });
     pressed('grid', isOn => { grid.isShown = isOn; });
+    pressed('velocities', isOn => stage.showArrows('velocity', isOn));
+    pressed('accelerations', isOn => stage.showArrows('acceleration', isOn));
     pressed('measure', isOn => { measure.isOn = isOn; });
     const acts = { fit: () => stage.fit(), closer: () => stage.zoom(1.4), wider: () => stage.zoom(1 / 1.4) };
     for (const [id, act] of Object.entries(acts)) byId(id).addEventListener('click', act);

@@ -394,13 +394,13 @@ def test_that_a_link_carries_the_values(open_page: Callable[..., Any]) -> None:
 def test_that_a_motion_is_kept_to_compare_with(open_page: Callable[..., Any]) -> None:
     page = open_page(crank_rocker("kept"))
     page.get_by_role("button", name="Keep to compare").click()
-    kept = page.evaluate("Array.from(live.ghost.q)")
+    kept = page.evaluate("Array.from(settings.kept[0].arrays.q)")
     page.evaluate(SOLVED, {"a": 0.7})
-    assert page.evaluate("Array.from(live.ghost.q)") == kept
+    assert page.evaluate("Array.from(settings.kept[0].arrays.q)") == kept
     assert page.evaluate("Array.from(player.data.arrays.q)") != kept
     picture = "stage.canvas.toDataURL()"
     together = page.evaluate(picture)
-    page.get_by_role("button", name="Forget what is kept").click()
+    page.get_by_role("button", name="Forget as made").click()
     assert page.evaluate(picture) != together
     page.close()
 

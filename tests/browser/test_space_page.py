@@ -179,8 +179,8 @@ def test_that_parameters_are_solved_again_on_the_page(page: Any) -> None:
     known_hull = next(mark for mark in drawn["marks"] if mark["kind"] == "hull")["points"]
     np.testing.assert_allclose(hull, known_hull, atol=1e-12)
     assert page.evaluate("player.data.drawing.size") == pytest.approx(drawn["size"], rel=1e-9)
-    page.click("#ghost")
-    assert page.evaluate("live.ghost !== null")
+    page.click("#keep")
+    assert page.evaluate("settings.kept.length") == 1
 
 
 def test_the_ghosts_of_newtons_iterates_and_a_guess_that_is_turned(page: Any) -> None:
