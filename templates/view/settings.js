@@ -69,7 +69,7 @@ const settings = {
     return `${symbolText(name)} = ${+(value * units.factor(unit)).toPrecision(5)} ${units.name(unit)}`.trim();
   },
 
-  /* What tells the present setting from the one that the page was made with. */
+  /* A name by the parameters with other values than those of the page. */
   nameNow() {
     const changed = player.data.parameters.filter((_, k) => live.values[k] !== live.given[k]);
     const said = changed.map(({ name, value, unit }) => this.titleOf(name, value, unit)).join(', ') || 'as made';
