@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import linecache
 import zlib
-from functools import partial
+from functools import lru_cache, partial
 from importlib.util import decode_source
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -116,11 +116,17 @@ def _text(file: Path) -> str:
         raise ContractError(f"{file} is not the text of a Python module. {REMEDY}") from error
 
 
+@lru_cache
+def _code(filename: str, source: str) -> CodeType:
+    """Return the code of a module's text: Python takes as long to read it as all else takes."""
+    return compile(source, filename, "exec")
+
+
 def _fill(module: ModuleType, filename: str, source: str) -> ModuleType:
     """Run a module's text in it and check the result."""
     module.__file__, names = filename, vars(module)
     try:
-        exec(compile(source, filename, "exec"), names)
+        exec(_code(filename, source), names)
     except SyntaxError as error:
         raise ContractError(
             f"{filename} is not a Python module: {error.msg} in line {error.lineno}. {REMEDY}"
