@@ -3,6 +3,7 @@
 mechanism -> system()        ConstraintSystem  names and attributes checked, all problems at once
 system    -> lower           Program           kernels x instances; each type derived once
 program   -> inline          InlineProgram     written out in one graph, where equal values meet
+system    -> held_system      ConstraintSystem  an equation for each freedom that nothing sees
 pattern   -> counting_problem  str              why no position can be solved for; else ""
 pattern   -> redundant_equations               of more equations than coordinates those that repeat
 program   -> emit_program    Emitted           the files of a target
@@ -138,6 +139,7 @@ def emit(
         start = Start(real) if points == "one" else None
         emitted, found = transmission_files(system, language, *transmission, start=start)
         return emitted if language == target else _unit(emitted, found, system)
+    system = further.held_system(system)
     with _without_collector(system):
         if form == "grouped" and (sensitivities or dynamics):
             what = "sensitivities" if sensitivities else "equations of motion"
@@ -375,7 +377,7 @@ def compile(  # noqa: A001 - the public name kc.compile
     UnsupportedError
         If there is no such target, it cannot print the mechanism, or there is no C compiler.
     """
-    system = system_of(model)
+    system = further.held_system(system_of(model))
     with _without_collector(system):
         target = _loadable(target, system, form)
         code = _lowered(system, form)
@@ -408,7 +410,7 @@ def forces_program(system: ConstraintSystem) -> Program | None:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RedundantConstraintWarning)
-        code = _lowered(system, "inline")
+        code = _lowered(further.held_system(system), "inline")
     return observing_forces(code) if isinstance(code, InlineProgram) else None
 
 
@@ -434,7 +436,7 @@ def inspect(model: Mechanism | ConstraintSystem) -> Inspection:
     from kincompile.ir.redundancy import missing_drivers, rank_report
     from kincompile.structure.report import inspect_system
 
-    system = system_of(model)
+    system = further.held_system(system_of(model))
     program = lower(system)
     ranks = rank_report(system, program)
     if not ranks.assembled:

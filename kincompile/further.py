@@ -15,6 +15,7 @@ from kincompile.emitters.emission import emit_program
 from kincompile.errors import InputError, KincompileError, UnsupportedError
 from kincompile.ir.inline import InlineProgram, inline
 from kincompile.ir.lower import lower
+from kincompile.structure.idle import loose_bodies
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -33,6 +34,18 @@ LARGEST_INLINE = 300
 LARGEST_REDUNDANT = 1000
 """Coordinates up to which redundant equations are found, by dense matrices; beyond, there may be no
 more equations than coordinates."""
+
+
+def held_system(system: ConstraintSystem) -> ConstraintSystem:
+    """Return a system with an equation more for each freedom that nothing sees."""
+    if system.held or len(system.coordinates) > LARGEST_REDUNDANT:
+        return system
+    loose = loose_bodies(system)
+    if not loose:
+        return system
+    from kincompile.ir.holding import with_held
+
+    return with_held(system, loose)
 
 
 def makers_of(

@@ -25,6 +25,7 @@ from kincompile.derivations.slides import slides_of
 from kincompile.derivations.transmission_section import transmission_section
 from kincompile.derivations.turned_section import R_OMEGA, turned_section
 from kincompile.errors import InputError
+from kincompile.further import held_system
 from kincompile.html import framed_html
 from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint
@@ -175,7 +176,7 @@ def derivation(
                 "the derivation of a transmission is one: leave out constraint, levels and form."
             )
         return _of_transmission(loop_of(model, *transmission), state)
-    system = system_of(model)
+    system = held_system(system_of(model))
     _require_known(system, constraint, shown := tuple(levels))
     _require_form(system, constraint, form)
     chosen = evaluation(system, state)

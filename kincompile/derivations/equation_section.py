@@ -9,6 +9,7 @@ import sympy
 
 from kincompile.derivations.steps import Steps
 from kincompile.derive.equations import EquationDerivatives, derive_equation
+from kincompile.model.resolve import held_text
 from kincompile.report.document import Chapter, Display, Math, Verbatim, table, text
 from kincompile.report.formulas import DerivativeSymbol, Equated
 
@@ -30,7 +31,7 @@ def equation_section(evaluation: Evaluation, equation: FreeEquation, rows: Rows)
     )
     gammas = [block for k in range(len(found)) for block in steps.gamma_terms(k)]
     return steps.section(
-        "Free equation",
+        "Equation that holds" if equation.holds else "Free equation",
         equation.is_driver,
         steps.coordinates(),
         steps.constraint(),
@@ -64,8 +65,11 @@ class _EquationSteps(Steps[EquationDerivatives]):
         for name in (*self.columns, *sorted(parameters & occurring)):
             names += [", " if names else "", Verbatim(name)]
         end = ", and in time." if self.equation.is_driver else "."
-        note = text("An equation in ", *names, end)
-        return self.step(1, "The equation and what occurs in it", note, level="")
+        notes = [text("An equation in ", *names, end)]
+        if self.equation.holds:
+            sentence = f"{held_text(self.equation.holds)}. Any numbers in it would do."
+            notes.insert(0, text(sentence))
+        return self.step(1, "The equation and what occurs in it", *notes, level="")
 
     def constraint(self) -> Chapter:
         lines = [

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from kincompile.model.points import Observed
-from kincompile.model.resolve import Joint
+from kincompile.model.resolve import FreeEquation, Joint, held_text
 from kincompile.quantities import quantities_of
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from kincompile.model.bodies import Body, Coordinate, Parameter
     from kincompile.model.outputs import ResolvedOutput
     from kincompile.model.points import OutputColumn, PlacedPoint
-    from kincompile.model.resolve import FreeEquation
     from kincompile.model.resolve_loads import AppliedLoad
     from kincompile.model.spline import SplineTable
     from kincompile.quantities import Columns, Part, Quantity, Rows
@@ -240,6 +239,13 @@ class Program:
             "motion": self.motion,
         }
         return quantities_of([part for part, found in parts.items() if found])
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """The freedoms that are held because nothing sees them, in words."""
+        items = (instance.constraint for instance in self.instances)
+        found = (held_text(x.holds) for x in items if isinstance(x, FreeEquation) and x.holds)
+        return tuple(dict.fromkeys(found))
 
     @property
     def corners(self) -> bool:

@@ -20,6 +20,7 @@ from kincompile.structure.rank import ANGLES_FIRST, RankReport, drivers_of, gene
 from kincompile.structure.remedies import (
     MissingDriver,
     advice,
+    balls_of,
     least_squares_will_do,
     rank_problem,
     surpluses,
@@ -50,7 +51,7 @@ def rank_report(
     The guess, shape (n,), is where it is meant to be assembled; without it, the system's own.
     """
     return generic_rank(
-        _evaluation(program),
+        evaluation(program),
         np.array([item.guess for item in system.coordinates]) if guess is None else guess,
         _angular(system),
         driver_rows(system),
@@ -60,7 +61,7 @@ def rank_report(
     )
 
 
-def _evaluation(program: Program) -> Evaluate:
+def evaluation(program: Program) -> Evaluate:
     """Return what gives Phi and Phi_q at states, with default parameters."""
     found = interpreter(program, ("Phi", "Phi_q"))
 
@@ -104,7 +105,7 @@ def redundant_equations(
             for item, first in zip(system.constraints, system.row_offsets, strict=True)
             if isinstance(item, Joint) and not item.is_driver
         ]
-        rows = rows_left_out(_evaluation(program), report, float(system.end), joints)
+        rows = rows_left_out(evaluation(program), report, float(system.end), joints)
         left_out = tuple(system.equations[row] for row in rows)
         return left_out, _warning(system, found, left_out), ""
     if report.motions.size:
@@ -184,13 +185,7 @@ def _together(
     start = dict(zip((x.name for x in system.coordinates), ranks.nearest, strict=True))
     whole, _, ball, joint = system.ground.kind.turning
     for item in drivers:
-        balls = [
-            other.name
-            for other in system.constraints
-            if isinstance(other, Joint)
-            and other.type_name == ball
-            and item.drives in (body.name for body in other.bodies)
-        ]
+        balls = balls_of(system, item.drives)
         if not item.axis:
             yield item
         elif turns[item.drives] == len("xyz") and abs(start[f"e0_{item.drives}"]) > HALF_TURN:
@@ -218,7 +213,7 @@ def _rates(
     """Return the rows that drivers would add to Phi_q, (k, n), of length one in scales; weights."""
     if not drivers:
         return np.zeros((0, ranks.scale.size)), np.zeros(0)
-    _, Phi_q = _evaluation(lower(system.rewritten(system.constraints, drivers)))(*ranks.state)
+    _, Phi_q = evaluation(lower(system.rewritten(system.constraints, drivers)))(*ranks.state)
     rows = Phi_q[0, -len(drivers) :] * ranks.scale
     angles = [any(x.unit == "rad" for x in item.arguments().values()) for item in drivers]
     return (

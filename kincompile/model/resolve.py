@@ -99,6 +99,10 @@ class Joint:
         return "t" in names or (self.written.sets_motion and bool(names))
 
 
+SPIN = "spin of "
+"""How the freedom of a body in space to turn begins, before its name."""
+
+
 @dataclass(frozen=True, slots=True)
 class FreeEquation:
     """A free equation in plain symbols, with the coordinates that occur in it."""
@@ -109,6 +113,13 @@ class FreeEquation:
     equation_names: tuple[str, ...]
     source: str = "free equation"
     corners: bool = False
+    # What it holds because nothing sees it, as "spin of rod"; "" where somebody wrote it.
+    holds: str = ""
+
+    @property
+    def spinning(self) -> str:
+        """Name of the body whose spin it holds, which nothing sees; "" where it holds none."""
+        return self.holds.removeprefix(SPIN) if self.holds.startswith(SPIN) else ""
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -118,12 +129,20 @@ class FreeEquation:
     @property
     def text(self) -> str:
         """The equation in words, for comments."""
-        return "; ".join(f"{expression} = 0" for expression in self.expressions)
+        said = f"{held_text(self.holds)}: " if self.holds else ""
+        return said + "; ".join(f"{expression} = 0" for expression in self.expressions)
 
     @property
     def is_driver(self) -> bool:
         """Whether it depends on time."""
         return any(depends_on(expression, ("t",)) for expression in self.expressions)
+
+
+def held_text(freedom: str) -> str:
+    """Return that a freedom is held: ``"spin of rod"``, or the name of a coordinate."""
+    spins = freedom.startswith(SPIN)
+    may = f"{freedom.removeprefix(SPIN)} may spin" if spins else f"{freedom} may change"
+    return f"{may}, which nothing sees: it is held"
 
 
 def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:

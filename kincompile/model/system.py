@@ -200,10 +200,11 @@ class ConstraintSystem(MatrixViews, TextViews):
         """Return the system itself."""
         return self
 
-    def observing(self, points: Sequence[BodyPoint]) -> ConstraintSystem:
-        """Return the system with these points, and what bodies have, as outputs, and no loads."""
+    def observing(self, points: Sequence[BodyPoint], *, spinning: bool = True) -> ConstraintSystem:
+        """Return the system with these points, and how bodies spin, as outputs, and no loads."""
         scope = _scope(self.bodies, self.coordinates, self.parameters, [], self.ground)
-        spins = [Output(*given) for body in self.bodies for given in body.on_request]
+        turning = self.bodies if spinning else ()
+        spins = [Output(*given) for body in turning for given in body.on_request]
         observers = resolved_observers(points, spins, scope, self.length_unit)
         return self._with({"body_points": tuple(points), "observers": observers, "loads": ()})
 
@@ -235,6 +236,18 @@ class ConstraintSystem(MatrixViews, TextViews):
             "observers": (*self.observers, *seen),
         }  # fmt: skip
         return self._with(changed)
+
+    def holding(self, rows: Sequence[FreeEquation]) -> ConstraintSystem:
+        """Return the system with equations more, for freedoms that nothing sees."""
+        found = (*self.constraints, *rows)
+        names = tuple(name for item in found for name in item.equation_names)
+        return self._with({"constraints": found, "equations": names})
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Names of the freedoms that are held because nothing sees them, one for each."""
+        free = (item for item in self.constraints if isinstance(item, FreeEquation))
+        return tuple(item.holds for item in free if item.holds)
 
     def without(
         self, bodies: Collection[str], observers: Sequence[PlacedPoint | ResolvedOutput]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.criteria import HALF
-from kincompile.structure.rank import DEPENDENT
+from kincompile.structure.rank import DEPENDENT, damped
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -27,6 +27,9 @@ TIMES, ITERATIONS = 32, 8
 
 NEAR_ENOUGH = math.sqrt(HALF)
 """Last step to a position, in scales: what it leaves is the square of it."""
+
+NO_DAMPING = 1e-12
+"""What takes the place of a damping where what no equation determines is to stay."""
 
 BETTER = 4.0
 """How many times farther from dependent another choice must keep the equations to be taken."""
@@ -40,7 +43,7 @@ def rows_left_out(
     They are so from t = 0 to the end, as far as the motion can be followed. `joints` are the rows
     of each joint, of which as many are left out as are redundant.
     """
-    null = _left_null_spaces(_along_motion(evaluate, ranks, end))
+    null = _left_null_spaces(np.array([matrix for _, matrix in along_motion(evaluate, ranks, end)]))
     chosen = list(ranks.redundant)
     if not len(null):
         return ranks.redundant
@@ -70,25 +73,30 @@ def _left_null_spaces(matrices: Array) -> Array:
     return np.asarray(u[values[:, -1] > DEPENDENT][:, :, matrices.shape[2] :])
 
 
-def _along_motion(evaluate: Evaluate, ranks: RankReport, end: float) -> Array:
-    """Return Phi_q in scales, with rows of length one, as far as the motion can be followed."""
-    found: list[Array] = []
+def along_motion(
+    evaluate: Evaluate, ranks: RankReport, end: float, times: int = TIMES
+) -> list[tuple[Array, Array]]:
+    """Return q and Phi_q in scales, with rows of length one, as far as it can be followed.
+
+    What no equation determines stays where it is.
+    """
+    found: list[tuple[Array, Array]] = []
     before, q = ranks.nearest, ranks.nearest
-    for t in np.linspace(0, end, TIMES):
+    for t in np.linspace(0, end, times):
         at = 2 * q - before
         for _ in range(ITERATIONS):  # few digits do; `rank`'s steps, to all, double a build
             Phi, Phi_q = (x[0] for x in evaluate(at[np.newaxis], np.array([t])))
             matrix = Phi_q * ranks.scale
             lengths = np.linalg.norm(matrix, axis=1)
             if not np.isfinite(lengths).all() or not lengths.all():
-                return np.array(found)
+                return found
             matrix = matrix / lengths[:, np.newaxis]
-            step = np.linalg.lstsq(matrix, Phi / lengths)[0]
+            step = damped(matrix, Phi / lengths, NO_DAMPING)
             at = at - ranks.scale * step
             if np.max(np.abs(step)) <= NEAR_ENOUGH:
                 break
         else:
-            return np.array(found)
-        found.append(matrix)
+            return found
+        found.append((at, matrix))
         before, q = q, at
-    return np.array(found)
+    return found

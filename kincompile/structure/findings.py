@@ -125,6 +125,11 @@ class Findings:
         Names of equations that depend on others at every such state, and agree with them.
     conflicting
         Names of equations that depend on others and cannot hold together with them.
+    held
+        Names of the freedoms that nothing sees and equations hold: ``"spin of rod"``, or a
+        coordinate.
+    holds
+        For each of these equations what it holds, and how to hold that otherwise.
     surpluses
         The constraints that have redundant or conflicting equations, and what to do about each.
     free_coordinates
@@ -160,6 +165,8 @@ class Findings:
     rank: int
     redundant: tuple[str, ...]
     conflicting: tuple[str, ...]
+    held: tuple[str, ...]
+    holds: tuple[str, ...]
     surpluses: tuple[Surplus, ...]
     free_coordinates: tuple[str, ...]
     missing_drivers: tuple[MissingDriver, ...]

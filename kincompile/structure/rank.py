@@ -291,7 +291,7 @@ class _Analysis:
                 break
             active = np.flatnonzero(~settled & ~stuck)
             try:
-                steps = np.array([_damped(matrices[k], Phi[k], damping[k]) for k in active])
+                steps = np.array([damped(matrices[k], Phi[k], damping[k]) for k in active])
             except (np.linalg.LinAlgError, RuntimeError):  # not finite
                 break
             moved = q[active] - self._scale * steps
@@ -315,7 +315,7 @@ class _Analysis:
         return Phi[:, rows] / terms, Phi_q[:, rows] * (self._scale / terms[:, None])
 
 
-def _damped(matrix: Array, Phi: Array, damping: float) -> Array:
+def damped(matrix: Array, Phi: Array, damping: float) -> Array:
     """Return the correction of Levenberg and Marquardt."""
     n = matrix.shape[1]
     if n <= SMALL:

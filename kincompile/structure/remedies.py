@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from kincompile.model.resolve import Joint
+from kincompile.model.resolve import FreeEquation, Joint, held_text
 from kincompile.names import listed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from kincompile.model.resolve import FreeEquation
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.rank import RankReport
 
@@ -140,6 +139,30 @@ def advice(missing: Sequence[MissingDriver]) -> str:
     # An AbsoluteOrientation drives three.
     drivers = listed(dict.fromkeys(item.text for item in missing))
     return f"{count} missing: add, for instance, {drivers}, as a function of kc.t"
+
+
+def held_advice(system: ConstraintSystem) -> tuple[str, ...]:
+    """Return for each freedom that is held which equation does it, and what else would."""
+    found = []
+    for item in system.constraints:
+        if isinstance(item, FreeEquation) and item.holds:
+            balls = balls_of(system, item.spinning)
+            other = f"a {system.ground.kind.turning[3]} in place of {balls[0]}" if balls else ""
+            other = other or "a joint that does not let it turn, or an Equation of your own"
+            found.append(f"{held_text(item.holds)} by {item.name}. To choose how, take {other}")
+    return tuple(found)
+
+
+def balls_of(system: ConstraintSystem, body: str) -> list[str]:
+    """Return the names of the ball joints of a body."""
+    kinds = system.ground.kind.turning[2:3]
+    return [
+        item.name
+        for item in system.constraints
+        if isinstance(item, Joint)
+        and item.type_name in kinds
+        and body in (other.name for other in item.bodies)
+    ]
 
 
 def rank_problem(system: ConstraintSystem, ranks: RankReport) -> str:

@@ -10,7 +10,12 @@ from kincompile.model.resolve import Joint
 from kincompile.structure.blocks import parts_of
 from kincompile.structure.counting import counting_problem, unmatched
 from kincompile.structure.findings import ConstraintEntry, Findings, Mobility, NamedBlock
-from kincompile.structure.remedies import least_squares_will_do, rank_problem, surpluses
+from kincompile.structure.remedies import (
+    held_advice,
+    least_squares_will_do,
+    rank_problem,
+    surpluses,
+)
 from kincompile.structure.report_text import report_text
 
 if TYPE_CHECKING:
@@ -66,6 +71,8 @@ def inspect_system(
         rank=ranks.rank,
         redundant=tuple(names[row] for row in ranks.redundant),
         conflicting=tuple(names[row] for row in ranks.conflicting),
+        held=system.held,
+        holds=held_advice(system),
         surpluses=surpluses(system, ranks),
         free_coordinates=tuple(columns[column] for column in ranks.free),
         missing_drivers=missing,

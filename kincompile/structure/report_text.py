@@ -108,7 +108,7 @@ def _mobility_lines(found: Findings) -> list[str]:
     drivers = ", ".join(item.name for item in found.constraints if item.is_driver)
     terms = [
         (count.coordinates, "coordinates", _origin(count)),
-        (-count.joint_equations, "joint equations", ""),
+        (-count.joint_equations, "joint equations", _held(found)),
         (count.degrees_of_freedom, "degrees of freedom", "by Gruebler's count"),
         (-count.driver_equations, "driver equations", drivers),
         (count.undriven, "left over", _meaning(found)),
@@ -116,6 +116,11 @@ def _mobility_lines(found: Findings) -> list[str]:
     width = max(len(str(number)) for number, _, _ in terms)
     rows = [[f"{number:{width}d}", what, note] for number, what, note in terms]
     return table(("", "", ""), rows)[1:]
+
+
+def _held(found: Findings) -> str:
+    """Return which of the equations hold what nothing sees."""
+    return f"with {counted(len(found.held), 'held freedom')}" if found.held else ""
 
 
 def _meaning(found: Findings) -> str:
@@ -181,6 +186,8 @@ def _left(found: Findings) -> str:
 
 def _advice(found: Findings) -> Iterator[str]:
     """Yield what is wrong, and what to do."""
+    for sentence in found.holds:
+        yield f"{sentence}."
     if found.missing_drivers:
         yield f"{advice(found.missing_drivers)}."
     for item in found.surpluses[:EXPLAINED]:

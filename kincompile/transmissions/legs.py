@@ -22,7 +22,7 @@ from kincompile.calculus.expand import Expansion
 from kincompile.model.expressions import as_sympy, evaluate, symbol_names
 from kincompile.model.points import PlacedPoint
 from kincompile.model.relative import Distance as PlanarDistance
-from kincompile.model.resolve import Joint
+from kincompile.model.resolve import FreeEquation, Joint
 from kincompile.model.symbolic import SymbolicEnvironment
 from kincompile.space.primitives import Distance
 
@@ -75,7 +75,7 @@ def without_legs(
         if found is None:
             return system, np.array([values[x.name] for x in system.coordinates])
         leg, rod = found
-        rest = [x for x in system.constraints if not leg.touches(x)]
+        rest = [x for x in system.constraints if not (leg.touches(x) or leg.holds(x))]
         system = system.rewritten(rest, [rod]).without(leg.names, seen)
 
 
@@ -93,7 +93,9 @@ def lengths_of(system: ConstraintSystem, inputs: Collection[str]) -> list[sympy.
 
 
 def _is_plain(item: Any) -> bool:
-    """Return whether a constraint reads coordinates of its bodies alone."""
+    """Return whether a constraint reads coordinates of its bodies alone, or holds a spin."""
+    if isinstance(item, FreeEquation):
+        return bool(item.spinning)
     own = {name for body in item.bodies for name in body.coordinates}
     return own.issuperset(x for x in item.columns if x is not None)
 
@@ -171,6 +173,10 @@ class _Leg:
         """Return whether a constraint is one of these bodies."""
         return not _names(item).isdisjoint(self.names)
 
+    def holds(self, item: Any) -> bool:
+        """Return whether a constraint holds a spin of one of these bodies, which nothing sees."""
+        return isinstance(item, FreeEquation) and item.spinning in self.names
+
     def rod(self) -> PlanarDistance | Distance | None:
         """Return the distance that takes the place of the leg; None where it is no leg."""
         joints = [x for x in self.system.constraints if isinstance(x, Joint)]
@@ -178,7 +184,9 @@ class _Leg:
         inside = _between(self.system, self.names)
         ends = [x for x in touched if x not in inside and x.type_name in TOUCHING]
         # The distance of two points is one equation too many; others hold what spins.
-        if len(ends) != 2 or _rows(touched) != sum(len(x.coordinates) for x in self.bodies) + 1:
+        held = [x for x in self.system.constraints if self.holds(x)]
+        unknown = sum(len(x.coordinates) for x in self.bodies)
+        if len(ends) != 2 or _rows(touched) + _rows(held) != unknown + 1:
             return None
         (one, first), (other, second) = (self._end(x, is_own=False) for x in ends)
         places = self._places(inside)

@@ -14,16 +14,15 @@ import numpy as np
 import sympy
 
 from kincompile.errors import InputError
+from kincompile.ir.held_rows import holding
+from kincompile.ir.holding import moved_outputs
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.ir.redundancy import missing_drivers, rank_report
-from kincompile.model.equation import Equation
 from kincompile.model.inputs import input_name, input_rate, with_inputs
 from kincompile.model.mechanism import system_of
 from kincompile.names import column_name, listed, unknown
-from kincompile.space.points import SpatialPoint
-from kincompile.space.primitives import Dot1
-from kincompile.structure.rank import ANGLES_FIRST, DEPENDENT, drivers_of
+from kincompile.structure.rank import DEPENDENT
 from kincompile.structure.remedies import advice
 from kincompile.tables import counted
 from kincompile.transmissions.twists import require_linear, twists_in, with_spins
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.ir.program import Program
-    from kincompile.model.constraint import Constraint
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
     from kincompile.structure.rank import RankReport
@@ -112,13 +110,11 @@ def loop_of(
     require_linear(system, program, twists, ranks.state)
     matrix = interpret(program, ranks.state[0], 0 * ranks.state[0], ranks.state[1])[1][0]
     _require_freedoms(system, names, matrix * ranks.scale)
-    held: tuple[str, ...] = ()
     if len(ranks.motions):
         _require_determined(system, program, ranks, names, columns)
-        held, more = _holding(system, ranks)
-        system = system.rewritten(system.constraints, more)
+        system = system.holding(holding(system, program, ranks, ranks.motions))
     parameters, rates = (tuple(map(own, names)) for own in (input_name, input_rate))
-    return Loop(system, names, parameters, columns, held, twists, rates if is_moving else ())
+    return Loop(system, names, parameters, columns, system.held, twists, rates if is_moving else ())
 
 
 def _columns(system: ConstraintSystem, outputs: Sequence[str]) -> tuple[str, ...]:
@@ -193,13 +189,8 @@ def _require_determined(
     places = [item.name for item in system.coordinates]
     moving = {places[k] for k in np.flatnonzero(np.abs(ranks.motions).max(axis=0) > DEPENDENT)}
     if outputs := system.outputs:
-        count = len(ranks.motions)
-        q = np.repeat(ranks.state[0], count, axis=0)
-        q_dot, t = ranks.motions * ranks.scale, np.repeat(ranks.state[1], count)
-        first, rates = (interpret(program, q, x, t) for x in (0 * q_dot, q_dot))
-        apart = np.abs(np.array(rates[4:6]) - np.array(first[4:6])).max(axis=(0, 1))
-        sizes = 1 + np.abs(first[4][0])
-        found = zip(outputs, apart / sizes, strict=True)
+        apart = np.abs(moved_outputs(program, ranks)).max(axis=(0, 1))
+        found = zip(outputs, apart, strict=True)
         moving |= {item.name for item, x in found if x > DEPENDENT}
     if wrong := [name for name in columns if name in moving]:
         missing = missing_drivers(system, ranks)
@@ -208,77 +199,3 @@ def _require_determined(
             f"{counted(len(ranks.motions), 'degree')} of freedom left. Name more inputs, a "
             f"coordinate or a driver for each; {advice(missing)}."
         )
-
-
-def _holding(
-    system: ConstraintSystem, ranks: RankReport
-) -> tuple[tuple[str, ...], list[Constraint | Equation]]:
-    """Return names of freedoms, and constraints that hold them as they are at the start."""
-    names = [item.name for item in system.coordinates]
-    solids = {body.name: body for body in system.bodies if body.on_request}
-    turns = {name for body in solids.values() for name in body.coordinates[3:]}
-    frames = _Frames.of(system, list(solids.values()), ranks)
-    rows, weights, wanted = [], [], []
-    for name, row, item in zip(names, np.eye(len(names)), system.coordinates, strict=True):
-        if name not in turns:
-            rows.append(row)
-            weights.append(ANGLES_FIRST if item.unit == "rad" else 1.0)
-            wanted.append(name)
-    for body in solids:
-        for row in frames.spins[body] * ranks.scale:
-            rows.append(row / np.linalg.norm(row))
-            weights.append(ANGLES_FIRST)
-            wanted.append(body)
-    taken, _ = drivers_of(ranks.motions, np.array(rows), np.array(weights))
-    held: list[str] = []
-    more: list[Constraint | Equation] = []
-    for number, k in enumerate(taken, start=1):
-        name, title = wanted[k], f"held_{number}"
-        if name in solids:
-            held.append(f"spin of {name}")
-            motion = ranks.motions.T @ (ranks.motions @ rows[k]) * ranks.scale
-            vectors = frames.across(name, frames.spins[name] @ motion)
-            more.append(Dot1(title, system.ground, vectors[0], solids[name], vectors[1], 0))
-        else:
-            held.append(name)
-            value = float(ranks.nearest[names.index(name)])
-            more.append(Equation(title, sympy.Symbol(name) - value))
-    return tuple(held), more
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Frames:
-    """Bodies in space at the generic state and at the start."""
-
-    # Angular velocity in body-fixed components per rate of each coordinate, (3, n), at the state.
-    spins: dict[str, Array]
-    turned: dict[str, Array]  # A (3, 3) at the start
-
-    @classmethod
-    def of(cls, system: ConstraintSystem, bodies: Sequence[Any], ranks: RankReport) -> _Frames:
-        """Evaluate the frames of bodies."""
-        if not bodies:
-            return cls({}, {})
-        ends = (np.zeros(3), *np.eye(3))
-        points = [SpatialPoint(x.name, x, tuple(end.tolist())) for x in bodies for end in ends]
-        program, n = lower(system.observing(points)), len(system.coordinates)
-        rest, t = np.zeros((1, n)), ranks.state[1]
-        places = interpret(program, ranks.nearest[np.newaxis], rest, t)[4][0, : 12 * len(bodies)]
-        states = np.repeat(ranks.state[0], n, axis=0), np.eye(n), np.repeat(t, n)
-        rates = interpret(program, *states)[4][:, 12 * len(bodies) :].T.reshape(-1, 2, 3, n)
-        names = [body.name for body in bodies]
-        origins, axes = np.split(places.reshape(-1, 4, 3), (1,), axis=1)
-        return cls(
-            dict(zip(names, rates[:, 1], strict=True)),
-            dict(zip(names, (axes - origins).swapaxes(1, 2), strict=True)),
-        )
-
-    def across(self, name: str, axis: Array) -> tuple[tuple[float, ...], ...]:
-        """Return directions of the ground and of a body, at right angles to an axis.
-
-        Their scalar product is zero at the start, and changes as the body turns about the axis.
-        """
-        across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-        still = self.turned[name] @ np.cross(axis, across)
-        first, second = (x / np.linalg.norm(x) for x in (still, across))
-        return tuple(first.tolist()), tuple(second.tolist())

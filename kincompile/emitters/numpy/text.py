@@ -51,6 +51,12 @@ def solvability_text(program: Program) -> str:
             "# equations that repeat others at every assembled position; a solve leaves them out",
             f"REDUNDANT = {names}",
         ]
+    if program.held:
+        names = tuple_text(f'"{sentence}"' for sentence in program.held)
+        lines += [
+            "# freedoms that move no output, no joint and no other body; an equation holds each",
+            f"HELD = {names}",
+        ]
     if program.unsolvable:
         sentence = (json.dumps(piece, ensure_ascii=False) for piece in pieces(program.unsolvable))
         lines += [
