@@ -10,7 +10,7 @@ stays far from there, as far as the motion can be followed.
 from __future__ import annotations
 
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import sympy
@@ -32,11 +32,12 @@ if TYPE_CHECKING:
     from kincompile.structure.rank import RankReport
 
     Array = NDArray[np.float64]
+    Parts = Sequence[Any] | NDArray[Any]
 
 SPACE = 3
 """Components of a point of a body in space, whose other coordinates are Euler parameters."""
 DIGITS = 3
-"""Decimals of the numbers in an equation that holds: any numbers do, and few digits are readable."""
+"""Decimals of the numbers in an equation that holds: any do, and few are readable."""
 RATHER = 0.3
 """By how much farther from singular than the ground another body keeps an axis that it holds."""
 TIMES = 16
@@ -69,7 +70,8 @@ def holding(
             rows.append(row / np.linalg.norm(row))
             weights.append(ANGLES_FIRST * (ANGLES_FIRST if len(axes) == 1 else 1.0))
             wanted.append((body, axis if len(axes) == 1 else None))
-    taken, _ = drivers_of(motions, np.array(rows), np.array(weights))
+    first_of_equals = 1 - DEPENDENT * np.arange(len(rows))
+    taken, _ = drivers_of(motions, np.array(rows), np.array(weights) * first_of_equals)
     path = _path(system, program, ranks, motions)
     moving = np.abs(motions).max(axis=0) > DEPENDENT
     still = {
@@ -149,21 +151,21 @@ def _spin(
     turned = {name: p / np.linalg.norm(p, axis=1, keepdims=True) for name, p in at.items()}
     symbols = {x.name: [sympy.Symbol(k) for k in x.coordinates[SPACE:]] for x in (body, *others)}
     own, given = turned[body.name].T, symbols[body.name]
-    choices = [(*_choice(own, axis, RATHER), given)]
+    choices: list[tuple[float, Array, Parts]] = [(*_choice(own, axis, RATHER), given)]
     for other in others:
         relative = product(_inverse(turned[other.name].T), own)
         expressions = product(_inverse(symbols[other.name]), given)
         choices.append((*_choice(relative, axis, 0.0), expressions))
-    _, c, expressions = max(choices, key=lambda x: x[0])
-    terms = zip(map(_rounded, c), expressions, strict=True)
-    return sympy.expand(sympy.Add(*(number * x for number, x in terms)))
+    _, c, parts = max(choices, key=lambda x: x[0])
+    terms = (_rounded(number) * x for number, x in zip(c, parts, strict=True))
+    return cast("sympy.Expr", sympy.expand(sympy.Add(*terms)))
 
 
-def _choice(r: Sequence[Any], axis: Array, more: float) -> tuple[float, Array]:
+def _choice(r: Parts, axis: Array, more: float) -> tuple[float, Array]:
     """Return how far from singular orientations r, four of (S,), stay, plus more; and c (4,)."""
     u = (0.0, *axis)
     directions = np.array(product(product(r, u), _inverse(r))[1:]).T
-    mean, normal = directions.mean(axis=0), np.linalg.svd(directions)[2][-1]
+    mean, normal = directions.mean(axis=0), np.linalg.svd(directions, full_matrices=False)[2][-1]
     middles = [x / np.linalg.norm(x) for x in (mean, normal, -normal, directions[0]) if x.any()]
     margins = [float((directions @ x).min()) for x in middles]
     margin = max(margins)
@@ -176,7 +178,7 @@ def _choice(r: Sequence[Any], axis: Array, more: float) -> tuple[float, Array]:
     return margin + more, c / np.linalg.norm(c)
 
 
-def product(a: Sequence[Any], b: Sequence[Any]) -> tuple[Any, ...]:
+def product(a: Parts, b: Parts) -> tuple[Any, ...]:
     """Return the Euler parameters of one rotation after another, A(a) A(b)."""
     (a0, a1, a2, a3), (b0, b1, b2, b3) = a, b
     return (
@@ -187,6 +189,6 @@ def product(a: Sequence[Any], b: Sequence[Any]) -> tuple[Any, ...]:
     )
 
 
-def _inverse(p: Sequence[Any]) -> tuple[Any, ...]:
+def _inverse(p: Parts) -> tuple[Any, ...]:
     """Return the Euler parameters of the rotation back."""
     return p[0], -p[1], -p[2], -p[3]

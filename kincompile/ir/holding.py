@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.ir.held_rows import SPACE, holding, product, spins_of
-from kincompile.ir.interpret import interpret, interpreter
+from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.ir.redundancy import evaluation, rank_report
 from kincompile.model.points import BodyPoint
@@ -58,7 +58,7 @@ def _is_clear(system: ConstraintSystem, program: Program, loose: Collection[str]
         matrix = evaluation(program)(guess, np.zeros(1))[1][0]
     columns = _columns(system, loose)
     own = matrix[np.abs(matrix[:, columns]).max(axis=1) > 0][:, columns]
-    if len(own) < len(columns) or not np.isfinite(own).all():
+    if len(own) < len(columns) or not np.isfinite(own).all() or not own.any(axis=0).all():
         return False
     own = own / np.linalg.norm(own, axis=1, keepdims=True)
     own = own / np.linalg.norm(own, axis=0)
@@ -100,8 +100,7 @@ class _Idle:
         lines = self._lines(places)
         found = _span([self._idle(some, seen, places) for some in lines])
         if self.system.loads and len(found) < count:
-            seen.append(self._inertia())  # what else is free moves by its masses, and so do these
-            found = _span([self._idle(some, seen, places) for some in lines])
+            return found[:0]  # the others move by masses and forces, and so do these
         return found
 
     def _lines(self, places: Mapping[str, Array]) -> list[set[str]]:
@@ -145,13 +144,6 @@ class _Idle:
         every = np.vstack([*seen, np.delete(self.ranks.motions.T, own, axis=0)])
         _, values, rest = np.linalg.svd(every)
         return np.asarray(rest[np.sum(values > DEPENDENT) :] @ self.ranks.motions)
-
-    def _inertia(self) -> Array:
-        """Return the momenta of the motions."""
-        q, t = self.ranks.state
-        (mass,) = interpreter(self.program, ("M",))(q, 0 * q, t)
-        momenta = mass[0] @ (self.ranks.motions * self.ranks.scale).T
-        return np.asarray(momenta / (np.abs(mass[0]).max() or 1.0))
 
     def _centres(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
         """Return where the centres on each loose body are, and how the motions move them."""

@@ -241,11 +241,12 @@ class Program:
         return quantities_of([part for part, found in parts.items() if found])
 
     @property
-    def held(self) -> tuple[str, ...]:
-        """The freedoms that are held because nothing sees them, in words."""
+    def held(self) -> dict[str, str]:
+        """The freedoms in words that nothing sees, by the equation that holds each."""
         items = (instance.constraint for instance in self.instances)
-        found = (held_text(x.holds) for x in items if isinstance(x, FreeEquation) and x.holds)
-        return tuple(dict.fromkeys(found))
+        return {
+            x.name: held_text(x.holds) for x in items if isinstance(x, FreeEquation) and x.holds
+        }
 
     @property
     def corners(self) -> bool:

@@ -141,8 +141,9 @@ class FreeEquation:
 def held_text(freedom: str) -> str:
     """Return that a freedom is held: ``"spin of rod"``, or the name of a coordinate."""
     spins = freedom.startswith(SPIN)
-    may = f"{freedom.removeprefix(SPIN)} may spin" if spins else f"{freedom} may change"
-    return f"{may}, which nothing sees: it is held"
+    body = freedom.removeprefix(SPIN)
+    may = f"{body} may spin about its own axis" if spins else f"{freedom} may change"
+    return f"{may}; nothing sees it, so it is held"
 
 
 def resolve_equation(equation: Equation, scope: Scope) -> FreeEquation | None:

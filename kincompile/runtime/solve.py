@@ -394,7 +394,7 @@ def explained(inputs: Inputs, motion: Motion, outcome: Outcome) -> tuple[str, tu
         passed = "".join(f" Passed: {event.kind} at t = {event.t:.10g}." for event in events)
         largest = motion.residual.max()
         said = WORDS["converged"].format(name=name, points=points, residual=f"{largest:.2g}")
-        held = "".join(f" {sentence}." for sentence in inputs.code.held)
+        held = "".join(f" {sentence}." for sentence in dict.fromkeys(inputs.code.held.values()))
         return said + passed + held, ()
     index = int(np.argmax(motion.status != Status.CONVERGED))
     why, asked = _why(outcome, events, times[index], _asked(inputs, outcome))

@@ -142,7 +142,7 @@ def spread(points: Array, size: float) -> int:
 
 
 def _numbers(given: Sequence[Scalar], defaults: Mapping[str, float]) -> list[float]:
-    return [float(evaluate(as_sympy(x), defaults) or 0.0) for x in given]
+    return [float(evaluate(as_sympy(x), dict(defaults)) or 0.0) for x in given]
 
 
 def _narrowed(

@@ -52,10 +52,12 @@ def solvability_text(program: Program) -> str:
             f"REDUNDANT = {names}",
         ]
     if program.held:
-        names = tuple_text(f'"{sentence}"' for sentence in program.held)
+        sentences = (f'    "{name}": "{sentence}",' for name, sentence in program.held.items())
         lines += [
-            "# freedoms that move no output, no joint and no other body; an equation holds each",
-            f"HELD = {names}",
+            "# freedoms that move no output, no joint and no other body, by what holds them",
+            "HELD = {",
+            *sentences,
+            "}",
         ]
     if program.unsolvable:
         sentence = (json.dumps(piece, ensure_ascii=False) for piece in pieces(program.unsolvable))

@@ -115,7 +115,7 @@ class Compiled:
     patterns: Mapping[str, NDArray[np.signedinteger[Any]]]  # as `pattern`, of each matrix
     has_loads: bool  # whether it has M, Q and their derivatives
     redundant: tuple[str, ...]  # names of the equations that repeat others, and agree with them
-    held: tuple[str, ...]  # freedoms that nothing sees and equations hold, in words
+    held: Mapping[str, str]  # freedoms in words that nothing sees, by what holds them
     # Why the equations cannot determine the coordinates; "" if they can, or if unknown.
     unsolvable: str
     corners: bool  # whether its drivers may have corners
@@ -343,7 +343,7 @@ def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compi
         has_loads="LOADS" in names,
         **typed,
         redundant=names.get("REDUNDANT", ()),
-        held=names.get("HELD", ()),
+        held=names.get("HELD", {}),
         unsolvable=names.get("UNSOLVABLE", ""),
         corners=names.get("CORNERS", False),
         lanes=LaneFunctions(

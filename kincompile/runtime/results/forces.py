@@ -101,6 +101,7 @@ class Forces(OfMotion):
     multipliers: Array
     undetermined: tuple[str, ...]
     _joints: dict[str, tuple[str, ...]]
+    _held: Mapping[str, str]
 
     def _column(self, name: str) -> Array:
         """Return a force, zeros where it is not a column since it vanishes."""
@@ -234,10 +235,20 @@ class Forces(OfMotion):
         return [(name, f"{largest(values):.6g}", unit) for name, (values, unit) in columns]
 
     def remarks(self) -> list[str]:
-        """Return a line on what is not determined, if anything is."""
+        """Return a line on what is not determined, if anything is, and on each held freedom."""
         shared = [name for name in self.undetermined if not name.startswith("lambda_")]
+        found = [f"not determined, since redundant joints share it: {listed(shared)}"]
+        return [*(found if shared else ()), *map(self._bearing, self._held)]
+
+    def _bearing(self, row: str) -> str:
+        """Say what an equation bears that holds a freedom which nothing sees."""
+        every = np.abs(self.multipliers)
+        own = every[..., self.motion.equations.index(row)]
+        if not np.nanmax(own, initial=0.0) > HALF * np.nanmax(every, initial=0.0):
+            return f"{self._held[row]}; no load turns it"
         return (
-            [f"not determined, since redundant joints share it: {listed(shared)}"] if shared else []
+            f"{self._held[row]}. Loads or its inertia would turn it, and forces depend on how it "
+            f"is held: {multiplier(row)} is up to {np.nanmax(own):.3g}"
         )
 
     def headline(self) -> str:
@@ -283,7 +294,7 @@ def forces(solution: Solution) -> Forces:
     added = names[m:]
     merged = solution.observed.joined(added, {name: units[name] for name in added}, values[..., m:])
     motion = solution.observing(merged)
-    return Forces(motion, added, values[..., :m], shared, dict(joints))
+    return Forces(motion, added, values[..., :m], shared, dict(joints), code.held)
 
 
 def no_value(name: str, bodies: Sequence[str], t: float) -> str:
