@@ -85,8 +85,8 @@ def test_that_a_rod_between_balls_is_held_and_everything_else_moves_as_with_a_di
 def test_that_points_on_the_axis_are_those_of_a_rod_that_is_held_by_hand(held):
     by_hand = moved(rssr("by hand"))
     assert_the_same(held, by_hand, ["x_rod", "y_rod", "z_rod"])
-    ends = [spatial.orientation(x, "rod").apply(X) for x in (held, by_hand)]
-    np.testing.assert_allclose(*ends, atol=1e-12)
+    found, wanted = (spatial.orientation(x, "rod").apply(X) for x in (held, by_hand))
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
     assert "held" not in by_hand.message
 
 
