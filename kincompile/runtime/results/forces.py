@@ -241,7 +241,7 @@ class Forces(OfMotion):
         return [*(found if shared else ()), *map(self._bearing, self._held)]
 
     def _bearing(self, row: str) -> str:
-        """Say what an equation bears that holds a freedom which nothing sees."""
+        """Return in words the freedom that an equation holds, and its multiplier."""
         every = np.abs(self.multipliers)
         own = every[..., self.motion.equations.index(row)]
         if not np.nanmax(own, initial=0.0) > HALF * np.nanmax(every, initial=0.0):
