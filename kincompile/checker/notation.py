@@ -33,15 +33,19 @@ _SIGNS = str.maketrans({
     "\u00b2": "^2", "\u00b3": "^3", "\u2074": "^4",
 })  # fmt: skip
 _DEGREES = re.compile(r"(\d+\.?\d*|\.\d+)\s*(?:°|\^\{?\\circ\}?)")
-_NAME = r"(?:[A-Za-z][A-Za-z0-9]*(?:_\{?\w+\}?)?)"
+_NAME = r"(?:[A-Za-z][A-Za-z0-9]*(?:_(?:\{\w+\}|\w+))?)"
 _MATRIX = re.compile(r"\\(begin|end)\s*\{[a-zA-Z]*(?:matrix|array)\}(?:\{[lcr|]*\})?")
-_DOT = re.compile(r"\\(d{1,2}ot)\s*(?:\{\s*(" + _NAME + r")\s*\}|([A-Za-z]+))\s*((?:_\{?\w+\}?)?)")
+_DOT = re.compile(
+    r"\\(d{1,2}ot)\s*(?:\{\s*(" + _NAME + r")\s*\}|([A-Za-z]+))\s*((?:_(?:\{\w+\}|\w+))?)"
+)
 _FRACTION = re.compile(r"\\[dt]?frac\s*")
 _FUNCTION = r"(?:arc)?(?:sin|cos|tan)|sqrt|exp|ln|log"
 _POWER = re.compile(rf"\\?\b({_FUNCTION})\s*\^\s*(?:\{{(\d+)\}}|(\d))\s*")
 _BARE = re.compile(rf"(?<![A-Za-z])({_FUNCTION})\s*({_NAME})(?!\w|\()")
 _FONTS = re.compile(r"\\(?:mathbf|mathrm|boldsymbol|bm|text|operatorname)\s*\{(\\?\w+)\}")
 _NO_INK = re.compile(r"\\(?:left|right|big|Big|[,;:! ]|quad|displaystyle)(?![a-zA-Z])")
+_ELEMENTWISE = re.compile(r"(?<=[\w)])\.(?=[/^]|\*(?!\*))")
+"""The dot of MATLAB's operators: 0.5.*sin(phi).^2."""
 _FACTORS = re.compile(r"(?<=[\w)])[ \t]+(?=[A-Za-z0-9(])|(?<=\))(?=[\w(])")
 _TOKEN = re.compile(r"(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][+-]?\d+(?!\w))?|[A-Za-z_]\w*|\*\*|\S")
 _VALUE = re.compile(r"[\w.)]")
@@ -55,8 +59,8 @@ MOST = 20_000
 
 def plain(text: str) -> str:
     """Return a text as one types it, in ASCII."""
-    text = re.sub(r"(?<![\w.])1[ij]\b", "I", text)
-    if len(text) > MOST or (text.isascii() and "\\" not in text):
+    text = _ELEMENTWISE.sub("", re.sub(r"(?<![\w.])1[ij]\b", "I", text))
+    if len(text) > MOST or (text.isascii() and "\\" not in text and "_{" not in text):
         return text
     text = _DEGREES.sub(r"(\1*pi/180)", text.translate(_SIGNS))
     text = _without_greek(text)

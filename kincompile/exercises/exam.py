@@ -42,7 +42,9 @@ LOUD = 3
 """A state is drawn from this part of the motion, in which no entry is near zero."""
 
 SMALLEST = 1e-9
-"""An entry that is smaller all the way is zero wherever the constraints hold: it is no question."""
+"""An entry that is smaller all the way is zero wherever the constraints hold: it is no question.
+
+Of gamma all answers that are zero there would be right."""
 
 
 def choose_questions(variant: Mechanism, blanks: Sequence[Blank]) -> tuple[Blank, ...]:

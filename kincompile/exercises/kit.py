@@ -193,8 +193,8 @@ def exercise(
     """Make an exercise: for each student a variant of a mechanism with entries to derive by hand.
 
     Each variant has other numbers for the parameters (for points and distances, where there are no
-    parameters), assembles and moves through its motion. Six entries of Phi_q and three of gamma
-    are blanks, of all joints in turn.
+    parameters), assembles and moves through its motion. Up to six entries of Phi_q and three of
+    gamma are blanks, of all joints in turn; none that is zero wherever the constraints hold.
 
     Parameters
     ----------
@@ -244,9 +244,9 @@ def exercise(
     if not mistakes:
         blanks = choose_blanks(made[0].system(), seed)
         states: Any = ()
+        sheets = import_module("kincompile.exercises.exam")  # it loads the checker
+        blanks = sheets.choose_questions(made[0], blanks)
         if exam:
-            sheets = import_module("kincompile.exercises.exam")  # it loads the checker
-            blanks = sheets.choose_questions(made[0], blanks)
             states = [
                 sheets.choose_state(x, blanks, f"{seed}-{k}") for k, x in enumerate(made, start=1)
             ]
