@@ -1,11 +1,14 @@
 """Robots from their files, against the frames of Pinocchio and MuJoCo (tests/data/robots)."""
 
 import json
+import re
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
@@ -51,6 +54,39 @@ def test_that_frames_are_those_of_the_oracle(name: str) -> None:
             if "p" in place:
                 expected = Rotation.from_quat(np.roll(place["p"], -1))
                 assert (turn[0] * expected.inv()).magnitude() < 1e-9, link
+
+
+@pytest.mark.parametrize(
+    "name", [SMALL[0], *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE[:-1])]
+)
+def test_that_the_loops_are_closed_from_the_zero_pose(name: str) -> None:
+    """The frames of each pair of the sidecar coincide, though the file's own pose is open."""
+    m = kc.read(DATA / f"{name}.urdf")
+    places = {"ground": np.eye(4)}
+    for body in m.bodies:
+        place = places[body.name] = np.eye(4)
+        place[:3, 3] = [float(value) for value in body.guess[:3]]
+        place[:3, :3] = Rotation.from_quat(
+            np.roll([float(p) for p in body.guess[3:]], -1)
+        ).as_matrix()
+    frames = {link: places[body] @ place for link, (body, place) in m.links.items()}
+    text = (DATA / f"{name}.urdf").read_text()
+    child = dict(re.findall(r'<joint name="([^"]+)".*?<child link="([^"]+)"', text, re.DOTALL))
+    sidecar = yaml.safe_load((DATA / f"{name}.yaml").read_text())
+    assert oracle(name)["zero_pose_residual"] > 1e-3
+    for pair, kind in zip(sidecar["closed_loop"], sidecar["type"], strict=True):
+        a, b = (frames[end if end in frames else child[end]] for end in pair)
+        count = 3 if kind.lower() == "6d" else 0
+        assert np.abs(a[:3, 3] - b[:3, 3]).max() < 1e-12
+        assert np.abs(a[:3, :count] - b[:3, :count]).max(initial=0) < 1e-12
+
+
+def test_that_packages_that_are_missing_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    monkeypatch.setattr("kincompile.files.robots.sidecar.yaml", None)
+    for name in ("welded_four_bar.xml", "5bar_linkage_iso3d.urdf"):
+        with pytest.raises(kc.InputError, match=r"pip install 'kincompile\[robots\]'"):
+            kc.read(DATA / name)
 
 
 LOOPS = {
