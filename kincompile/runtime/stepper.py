@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -169,6 +169,13 @@ class Stepper:
         if self._make is None and inputs.code.has(STEPPER):
             self._make = inputs.code.request(STEPPER)
         self._begin()
+
+    def __reduce__(self) -> NoReturn:
+        """Say that it cannot be copied: what C keeps of a motion has one place."""
+        raise InputError(
+            f"a stepper of {self._code.name} cannot be copied or pickled. Make another one, by "
+            "kc.stepper(module), and call it at the time of this one."
+        )
 
     def _begin(self) -> None:
         """Forget where the motion stands."""

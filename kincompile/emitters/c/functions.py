@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kincompile.emitters import solve_statements
 from kincompile.emitters.headings import title
@@ -11,12 +11,16 @@ from kincompile.emitters.lines import braced
 from kincompile.emitters.printer import ELEMENTARY, Dialect, Printer
 from kincompile.emitters.solve_statements import factorization, operands, solution
 from kincompile.emitters.statements import Statements
-from kincompile.ir.graph import Graph
+from kincompile.ir.graph import Graph, reachable
 from kincompile.quantities import quantity_named
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     from kincompile.emitters.evaluators import Listing
     from kincompile.emitters.planned_solve import BlockCall, SolveListing
+    from kincompile.emitters.schedule import Assignment
+    from kincompile.ir.graph import Node
     from kincompile.ir.inline import InlineProgram
 
 C = Dialect(
@@ -48,39 +52,120 @@ ABOUT = {
 }
 """What the kernels of several quantities give."""
 
-ANGLE_FUNCTIONS = frozenset({"cos", "sin", "cos_sin"})
-"""Functions whose fast form does not reach all angles."""
+CIRCULAR = ("cos", "sin")
+"""Functions of an angle whose fast form does not reach all angles."""
 
 
 def evaluator(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
     """Return a function that evaluates quantities at a point, and the one for a strip."""
-    has_angles = not ANGLE_FUNCTIONS.isdisjoint(listing.functions)
-    body = ["int64_t far = 0;"] if has_angles else []
-    body += WRITE.evaluation(code, listing, printer)
-    write = _with_angles if has_angles else _plain
-    return ["", f"// {ABOUT.get(name) or quantity_named(name).about}", *write(name, body)]
+    places = places_of_angles(code, _results(listing))
+    head = ["", f"// {ABOUT.get(name) or quantity_named(name).about}"]
+    if not places:
+        return [*head, *_plain(name, WRITE.evaluation(code, listing, printer))]
+    nodes = list(code.nodes)
+    for node, k in places.items():
+        nodes[node] = ("input", f"at->of_angles[{k}][lane]")
+    names = {node: name for node, name in listing.names.items() if node not in places}
+    angles = _angles(code, listing, nodes, _Printer(C, nodes, names, code.program.name))
+    rest = _only(listing, nodes, _results(listing))
+    body = WRITE.evaluation(code, rest, _Printer(C, nodes, listing.names, code.program.name))
+    return [*head, *_angles_at(name, angles), "", *_point_function(name, body), "", *_both(name)]
+
+
+def places_of_angles(code: InlineProgram, wanted: Iterable[int]) -> dict[int, int]:
+    """Return the cosines and sines that some nodes depend on, and where each is kept."""
+    used = reachable(code.nodes, wanted)
+    calls = (x for x in used if code.nodes[x][0] == "call" and code.nodes[x][1] in CIRCULAR)
+    return {node: k for k, node in enumerate(sorted(calls))}
+
+
+class _Printer(Printer):
+    """Prints inputs without a name, which are places of cosines and sines, as what they are."""
+
+    def _primary(self, kind: str, content: list[Any]) -> str:
+        return str(content[0]) if kind == "input" else super()._primary(kind, content)
+
+
+def _results(listing: Listing) -> list[int]:
+    """Return the nodes of all entries that a function gives."""
+    return [x.node for _, rows in listing.results for _, entries in rows for x in entries]
+
+
+def _only(listing: Listing, nodes: Sequence[Node], wanted: Iterable[int]) -> Listing:
+    """Return a listing with what some nodes need of it alone."""
+    used = set(reachable(nodes, wanted))
+
+    def kept(items: Iterable[Assignment]) -> tuple[Assignment, ...]:
+        return tuple(x for x in items if x.node in used)
+
+    frames = (replace(x, angle=None, values=kept(x.values)) for x in listing.frames)
+    steps = ((section, kept(own)) for section, own in listing.steps)
+    return replace(
+        listing,
+        frames=tuple(x for x in frames if x.values),
+        steps=tuple(x for x in steps if x[1]),
+        inputs=frozenset(nodes[x][1] for x in used if nodes[x][0] == "input"),
+    )
+
+
+def _angles(
+    code: InlineProgram, listing: Listing, nodes: Sequence[Node], printer: Printer
+) -> list[str]:
+    """Return the statements that put cosines and sines where a function reads them."""
+    calls: dict[int, dict[str, int]] = {}
+    for node in places_of_angles(code, _results(listing)):
+        _, function, angle = code.nodes[node]
+        calls.setdefault(angle, {})[function] = node
+    needed = _only(listing, nodes, calls)
+    values = [x for frame in needed.frames for x in frame.values]
+    values += [x for _, own in needed.steps for x in own]
+    lines = WRITE.inputs(code.program, needed)
+    lines += [WRITE.time] if "t" in needed.inputs else []
+    names = {x.node: x.name for x in values if nodes[x.node][0] != "input"}
+    # A node stands behind those that it depends on.
+    for node in sorted([*names, *(min(own.values()) for own in calls.values())]):
+        if node in names:
+            lines += WRITE.assigned(WRITE.value.format(names[node]), printer.definition(node))
+            continue
+        angle = code.nodes[node][2]
+        own = [printer.text(x) for _, x in sorted(calls[angle].items())]
+        given = printer.text(angle)
+        if len(own) == 2:
+            lines += WRITE.assigned("far", f"far | cos_sin({given}, exact, &{own[0]}, &{own[1]})")
+        else:
+            lines += WRITE.assigned(own[0], C.functions[code.nodes[node][1]].format(given))
+    return lines
 
 
 def _plain(name: str, body: list[str]) -> list[str]:
+    return [*_point_function(name, body), "", *_strip_function(name)]
+
+
+def _point_function(name: str, body: list[str]) -> list[str]:
     # A function of a whole point that is constant, or has no entry that varies, is possible.
     used = any("[lane]" in line for line in body)
     head = [f"_always_inline void {name}_at(strip *at, size_t lane)", "{"]
-    return [*braced(head, body if used else ["(void)at, (void)lane;"]), "", *_strip_function(name)]
+    return braced(head, body if used else ["(void)at, (void)lane;"])
 
 
-def _with_angles(name: str, body: list[str]) -> list[str]:
-    head = [f"_always_inline int64_t {name}_at(strip *at, size_t lane, int exact)", "{"]
+def _angles_at(name: str, body: list[str]) -> list[str]:
+    head = [f"_always_inline int64_t {name}_angles_at(strip *at, size_t lane, int exact)", "{"]
+    return braced(head, ["int64_t far = 0;", *body, "return far;"])
+
+
+def _both(name: str) -> list[str]:
+    """Return the function for a strip. What is large is compiled once, whatever the angles are."""
     return [
-        *braced(head, [*body, "return far;"]),
-        "",
         f"static void {name}_of_strip(strip *at, size_t count)",
         "{",
         "    int64_t far = 0;",
         "    const size_t all = _abreast(count);",
         "    for (size_t lane = 0; lane < all; lane++)",
-        f"        far |= {name}_at(at, lane, 0) & -(int64_t)(lane < count);",
+        f"        far |= {name}_angles_at(at, lane, 0) & -(int64_t)(lane < count);",
         "    for (size_t lane = 0; far && lane < count; lane++)",
-        f"        {name}_at(at, lane, 1);",
+        f"        {name}_angles_at(at, lane, 1);",
+        "    for (size_t lane = 0; lane < all; lane++)",
+        f"        {name}_at(at, lane);",
         "}",
     ]
 

@@ -142,9 +142,15 @@ class CSolver(SolverPrinter):
         lines = super().function(item)
         if any("lane < all;" in line for line in lines):
             lines.insert(lines.index("{") + 1, "    const size_t all = _abreast(lanes);")
-        if item.name == OF_SETS:
-            lines = ["// Many parameter sets.", "#ifndef _WITHOUT_SETS", "", *lines]
         return lines
+
+    def text(self) -> str:
+        """Return the solver, in which what many parameter sets need can be left out."""
+        if OF_SETS not in self.functions:
+            return super().text()
+        functions = "\n".join(self.function(self.functions[OF_SETS]))
+        first, rest = super().text().split(functions)
+        return f"{first}// Many parameter sets.\n#ifndef _WITHOUT_SETS\n\n{functions}{rest}\n#endif"
 
     # ------------------------------------------------------------ loops over lanes
 

@@ -6,7 +6,13 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from kincompile import quantities
-from kincompile.emitters.c.functions import WRITE, C, evaluator, solve_functions
+from kincompile.emitters.c.functions import (
+    WRITE,
+    C,
+    evaluator,
+    places_of_angles,
+    solve_functions,
+)
 from kincompile.emitters.c.march import CSolver
 from kincompile.emitters.constants import items, named_lists
 from kincompile.emitters.lines import WIDTH, indented, wrapped
@@ -242,8 +248,10 @@ def _strip(
     if listing is not None:
         lines = [*lines, *solve_functions(code, listing)]
         largest = largest_block(listing)
+    entries = [x.node for item in code.program.quantities for x in code.entries(item.name)]
     data = {
         "is_planned": listing is not None,
+        "n_angles": len(places_of_angles(code, entries)),
         "elementary": elementary(code.program, called, largest),
         "functions": "\n".join(lines),
         "results": indented(

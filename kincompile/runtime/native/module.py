@@ -124,12 +124,13 @@ class _Functions:
         self._shapes = _shapes(code)
         self._batch_type = batch_type(tuple(self._shapes))
         self._evaluate: Function = cache(lambda part: getattr(parts(part), f"{code.name}_evaluate"))
+        self._sets = cache(self._function_of_sets)
 
     def _run(self, batch: Any, part: Part = ONE) -> Any:
         """Evaluate a batch; not 0 where a number is not finite."""
         return self._evaluate(part)(byref(batch))
 
-    def _sets(self, name: str, *arguments: Any, result: Any = None) -> Function:
+    def _function_of_sets(self, name: str, *arguments: Any, result: Any = None) -> Function:
         """Return a function of many parameter sets, whose library is built if need be."""
         run: Any = getattr(self._parts(SETS), f"{self._name}_{name}_variants")
         run.argtypes, run.restype = (c_void_p, *arguments), result

@@ -30,6 +30,9 @@ print((module.Phi(module.GUESS, 0.5) + 0.0).tolist())
 """
 
 
+GCC = "gcc 12, Copyright (C) 2022 Free Software Foundation, Inc."
+
+
 @pytest.fixture
 def cache(monkeypatch, tmp_path, quick_compiler):
     """Return an empty cache, for the compiler of the session."""
@@ -183,6 +186,19 @@ def test_large_sources_are_not_optimized_for_minutes(
     monkeypatch.setattr(c_library, limit, 1000)
     assert_right(kc.compile(tiny(), target="c"))
     assert (tmp_path / "seen").read_text() == f"{level}\n"
+
+
+@pytest.mark.parametrize(("said", "are_named"), [("clang version 17", False), (GCC, True)])
+def test_that_flags_of_passes_are_for_gcc_alone(
+    monkeypatch, compiler, cache, tmp_path, said, are_named
+):
+    log = tmp_path / "log"
+    compiler(f'echo "$@" >> {log}\nexec REAL "$@"')
+    path = Path(os.environ["CC"])
+    path.write_text(path.read_text().replace("fake 1", f"'{said}'"))
+    assert_right(kc.compile(tiny(), target="c"))
+    assert ("-fno-tree-pre" in log.read_text()) == are_named
+    assert "-fno-math-errno" in log.read_text()
 
 
 # ---------------------------------------------------------------- the cache

@@ -1,5 +1,8 @@
 """`kc.stepper`: a motion one time after the other, which `kc.solve` gives for all times at once."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -405,6 +408,14 @@ def test_that_numbers_of_a_step_in_c_begin_with_a_line_of_the_cache():
         found = _zeros(count)
         assert (found.size, found.ctypes.data % 64) == (count, 0)
         assert not found.any()
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_that_it_cannot_be_copied(example_named, target, copied):
+    step = kc.stepper(compile_for(example_named("four_bar"), target))
+    with pytest.raises(InputError, match=r"four_bar cannot be copied or pickled. Make another"):
+        copied(step)
 
 
 def test_that_columns_have_names(example_named):
