@@ -98,6 +98,7 @@ typedef struct {
     double Phi_q[15][LANES];
     double nu[7][LANES];
     double gamma[7][LANES];
+    double of_angles[6][LANES];  // cosines and sines
     line on;
     double ends[K > 0 ? K : 1][LANES];
 } strip;
@@ -227,28 +228,38 @@ static double spline(const spline_table *table, int order, double angle)
 }
 
 // Phi and Phi_q in one go: a step of Newton's method.
-_always_inline int64_t position_at(strip *at, size_t lane, int exact)
+_always_inline int64_t position_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double phi_cam = at->q[2][lane];
+    const double phi_follower = at->q[5][lane];
+    const double alpha_contact = at->q[6][lane];
+    far = far | cos_sin(phi_cam, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    far = far | cos_sin(phi_follower, exact, &at->of_angles[2][lane], &at->of_angles[3][lane]);
+    far = far | cos_sin(alpha_contact, exact, &at->of_angles[4][lane], &at->of_angles[5][lane]);
+    return far;
+}
+
+_always_inline void position_at(strip *at, size_t lane)
+{
     const double x_cam = at->q[0][lane];
     const double y_cam = at->q[1][lane];
     const double phi_cam = at->q[2][lane];
     const double x_follower = at->q[3][lane];
     const double y_follower = at->q[4][lane];
-    const double phi_follower = at->q[5][lane];
     const double alpha_contact = at->q[6][lane];
     const double omega = at->p[0][lane];
     const double t = at->t[lane];
     // body frames: A = [[c, -s], [s, c]]
-    double c_cam, s_cam;
-    far |= cos_sin(phi_cam, exact, &c_cam, &s_cam);
-    double c_follower, s_follower;
-    far |= cos_sin(phi_follower, exact, &c_follower, &s_follower);
+    const double c_cam = at->of_angles[0][lane];
+    const double s_cam = at->of_angles[1][lane];
+    const double c_follower = at->of_angles[2][lane];
+    const double s_follower = at->of_angles[3][lane];
     // 4-5  PointFollower "contact": follower (0, -0.05) - cam (0, 0) profile table
     const double contact_follower_x = 0.05 * s_follower;
     const double contact_rho_cam = spline(&rho_j_contact, 0, alpha_contact);
-    const double cos_alpha_contact = cosine(alpha_contact, exact, &far);
-    const double sin_alpha_contact = sine(alpha_contact, exact, &far);
+    const double cos_alpha_contact = at->of_angles[4][lane];
+    const double sin_alpha_contact = at->of_angles[5][lane];
     const double contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam;
     const double contact_6 = contact_rho_cam * contact_u_cam_x;
     const double contact_7 = 0.05 * c_follower;
@@ -275,7 +286,6 @@ _always_inline int64_t position_at(strip *at, size_t lane, int exact)
     at->Phi_q[10][lane] = -contact_6;  // contact.y by phi_cam
     at->Phi_q[12][lane] = contact_follower_x;  // contact.y by phi_follower
     at->Phi_q[13][lane] = -(contact_rho_cam_1 * contact_u_cam_y + contact_6);  // contact.y by alpha_contact
-    return far;
 }
 
 static void position_of_strip(strip *at, size_t count)
@@ -283,9 +293,11 @@ static void position_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= position_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= position_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        position_at(at, lane, 1);
+        position_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        position_at(at, lane);
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
@@ -313,25 +325,34 @@ static void nu_of_strip(strip *at, size_t count)
 }
 
 // Right side of the acceleration equation Phi_q q_ddot = gamma.
-_always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
+_always_inline int64_t gamma_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double phi_cam = at->q[2][lane];
     const double phi_follower = at->q[5][lane];
     const double alpha_contact = at->q[6][lane];
+    far = far | cos_sin(phi_cam, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    far = far | cos_sin(phi_follower, exact, &at->of_angles[2][lane], &at->of_angles[3][lane]);
+    far = far | cos_sin(alpha_contact, exact, &at->of_angles[4][lane], &at->of_angles[5][lane]);
+    return far;
+}
+
+_always_inline void gamma_at(strip *at, size_t lane)
+{
+    const double alpha_contact = at->q[6][lane];
     const double phi_cam_dot = at->q_dot[2][lane];
     const double phi_follower_dot = at->q_dot[5][lane];
     const double alpha_contact_dot = at->q_dot[6][lane];
     // body frames: A = [[c, -s], [s, c]]
-    double c_cam, s_cam;
-    far |= cos_sin(phi_cam, exact, &c_cam, &s_cam);
-    double c_follower, s_follower;
-    far |= cos_sin(phi_follower, exact, &c_follower, &s_follower);
+    const double c_cam = at->of_angles[0][lane];
+    const double s_cam = at->of_angles[1][lane];
+    const double c_follower = at->of_angles[2][lane];
+    const double s_follower = at->of_angles[3][lane];
     // 4-5  PointFollower "contact": follower (0, -0.05) - cam (0, 0) profile table
     const double phi_follower_dot_sq = square(phi_follower_dot);
     const double contact_2 = spline(&rho_j_contact, 2, alpha_contact) * square(alpha_contact_dot);
-    const double cos_alpha_contact = cosine(alpha_contact, exact, &far);
-    const double sin_alpha_contact = sine(alpha_contact, exact, &far);
+    const double cos_alpha_contact = at->of_angles[4][lane];
+    const double sin_alpha_contact = at->of_angles[5][lane];
     const double contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam;
     const double contact_6 = 2.0 * spline(&rho_j_contact, 1, alpha_contact) * alpha_contact_dot;
     const double contact_u_cam_y = cos_alpha_contact * s_cam + sin_alpha_contact * c_cam;
@@ -353,7 +374,6 @@ _always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
         - contact_rho_cam * (phi_cam_dot * contact_8 + alpha_contact_dot * contact_8);
     // 6  AbsoluteAngle "motor": cam angle omega*t
     at->gamma[6][lane] = 0.0;
-    return far;
 }
 
 static void gamma_of_strip(strip *at, size_t count)
@@ -361,21 +381,33 @@ static void gamma_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= gamma_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= gamma_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        gamma_at(at, lane, 1);
+        gamma_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        gamma_at(at, lane);
 }
 
 // Phi, Phi_q, nu and gamma in one go.
-_always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
+_always_inline int64_t kinematics_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double phi_cam = at->q[2][lane];
+    const double phi_follower = at->q[5][lane];
+    const double alpha_contact = at->q[6][lane];
+    far = far | cos_sin(phi_cam, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    far = far | cos_sin(phi_follower, exact, &at->of_angles[2][lane], &at->of_angles[3][lane]);
+    far = far | cos_sin(alpha_contact, exact, &at->of_angles[4][lane], &at->of_angles[5][lane]);
+    return far;
+}
+
+_always_inline void kinematics_at(strip *at, size_t lane)
+{
     const double x_cam = at->q[0][lane];
     const double y_cam = at->q[1][lane];
     const double phi_cam = at->q[2][lane];
     const double x_follower = at->q[3][lane];
     const double y_follower = at->q[4][lane];
-    const double phi_follower = at->q[5][lane];
     const double alpha_contact = at->q[6][lane];
     const double phi_cam_dot = at->q_dot[2][lane];
     const double phi_follower_dot = at->q_dot[5][lane];
@@ -383,15 +415,15 @@ _always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
     const double omega = at->p[0][lane];
     const double t = at->t[lane];
     // body frames: A = [[c, -s], [s, c]]
-    double c_cam, s_cam;
-    far |= cos_sin(phi_cam, exact, &c_cam, &s_cam);
-    double c_follower, s_follower;
-    far |= cos_sin(phi_follower, exact, &c_follower, &s_follower);
+    const double c_cam = at->of_angles[0][lane];
+    const double s_cam = at->of_angles[1][lane];
+    const double c_follower = at->of_angles[2][lane];
+    const double s_follower = at->of_angles[3][lane];
     // 4-5  PointFollower "contact": follower (0, -0.05) - cam (0, 0) profile table
     const double contact_follower_x = 0.05 * s_follower;
     const double contact_rho_cam = spline(&rho_j_contact, 0, alpha_contact);
-    const double cos_alpha_contact = cosine(alpha_contact, exact, &far);
-    const double sin_alpha_contact = sine(alpha_contact, exact, &far);
+    const double cos_alpha_contact = at->of_angles[4][lane];
+    const double sin_alpha_contact = at->of_angles[5][lane];
     const double contact_u_cam_x = cos_alpha_contact * c_cam - sin_alpha_contact * s_cam;
     const double contact_6 = contact_rho_cam * contact_u_cam_x;
     const double contact_7 = 0.05 * c_follower;
@@ -449,7 +481,6 @@ _always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
         - contact_rho_cam * (phi_cam_dot * contact_14 + alpha_contact_dot * contact_14);
     // 6  AbsoluteAngle "motor": cam angle omega*t
     at->gamma[6][lane] = 0.0;
-    return far;
 }
 
 static void kinematics_of_strip(strip *at, size_t count)
@@ -457,9 +488,11 @@ static void kinematics_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= kinematics_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= kinematics_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        kinematics_at(at, lane, 1);
+        kinematics_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        kinematics_at(at, lane);
 }
 
 // Factor Phi_q; also return the determinants of its blocks.

@@ -101,6 +101,7 @@ typedef struct {
     double Phi_q[25][LANES];
     double nu[9][LANES];
     double gamma[9][LANES];
+    double of_angles[6][LANES];  // cosines and sines
     line on;
     double ends[K > 0 ? K : 1][LANES];
 } strip;
@@ -158,18 +159,27 @@ _always_inline int64_t cos_sin(double angle, int exact, double *cosine, double *
 }
 
 // Phi and Phi_q in one go: a step of Newton's method.
-_always_inline int64_t position_at(strip *at, size_t lane, int exact)
+_always_inline int64_t position_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double phi_crank = at->q[2][lane];
+    const double phi_coupler = at->q[5][lane];
+    const double phi_rocker = at->q[8][lane];
+    far = far | cos_sin(phi_crank, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    far = far | cos_sin(phi_coupler, exact, &at->of_angles[2][lane], &at->of_angles[3][lane]);
+    far = far | cos_sin(phi_rocker, exact, &at->of_angles[4][lane], &at->of_angles[5][lane]);
+    return far;
+}
+
+_always_inline void position_at(strip *at, size_t lane)
+{
     const double x_crank = at->q[0][lane];
     const double y_crank = at->q[1][lane];
     const double phi_crank = at->q[2][lane];
     const double x_coupler = at->q[3][lane];
     const double y_coupler = at->q[4][lane];
-    const double phi_coupler = at->q[5][lane];
     const double x_rocker = at->q[6][lane];
     const double y_rocker = at->q[7][lane];
-    const double phi_rocker = at->q[8][lane];
     const double a = at->p[0][lane];
     const double b = at->p[1][lane];
     const double c = at->p[2][lane];
@@ -177,12 +187,12 @@ _always_inline int64_t position_at(strip *at, size_t lane, int exact)
     const double omega = at->p[4][lane];
     const double t = at->t[lane];
     // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_coupler, s_coupler;
-    far |= cos_sin(phi_coupler, exact, &c_coupler, &s_coupler);
-    double c_rocker, s_rocker;
-    far |= cos_sin(phi_rocker, exact, &c_rocker, &s_rocker);
+    const double c_crank = at->of_angles[0][lane];
+    const double s_crank = at->of_angles[1][lane];
+    const double c_coupler = at->of_angles[2][lane];
+    const double s_coupler = at->of_angles[3][lane];
+    const double c_rocker = at->of_angles[4][lane];
+    const double s_rocker = at->of_angles[5][lane];
     // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
     const double a_2 = a / 2.0;
     const double B_crank_x = a_2 * c_crank;
@@ -225,7 +235,6 @@ _always_inline int64_t position_at(strip *at, size_t lane, int exact)
     // 6-7  Revolute "D": rocker (c/2, 0) - ground (d, 0)
     at->Phi_q[21][lane] = -D_rocker_y;  // D.x by phi_rocker
     at->Phi_q[23][lane] = D_rocker_x;  // D.y by phi_rocker
-    return far;
 }
 
 static void position_of_strip(strip *at, size_t count)
@@ -233,9 +242,11 @@ static void position_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= position_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= position_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        position_at(at, lane, 1);
+        position_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        position_at(at, lane);
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
@@ -266,12 +277,20 @@ static void nu_of_strip(strip *at, size_t count)
 }
 
 // Right side of the acceleration equation Phi_q q_ddot = gamma.
-_always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
+_always_inline int64_t gamma_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double phi_crank = at->q[2][lane];
     const double phi_coupler = at->q[5][lane];
     const double phi_rocker = at->q[8][lane];
+    far = far | cos_sin(phi_crank, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    far = far | cos_sin(phi_coupler, exact, &at->of_angles[2][lane], &at->of_angles[3][lane]);
+    far = far | cos_sin(phi_rocker, exact, &at->of_angles[4][lane], &at->of_angles[5][lane]);
+    return far;
+}
+
+_always_inline void gamma_at(strip *at, size_t lane)
+{
     const double phi_crank_dot = at->q_dot[2][lane];
     const double phi_coupler_dot = at->q_dot[5][lane];
     const double phi_rocker_dot = at->q_dot[8][lane];
@@ -279,12 +298,12 @@ _always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
     const double b = at->p[1][lane];
     const double c = at->p[2][lane];
     // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_coupler, s_coupler;
-    far |= cos_sin(phi_coupler, exact, &c_coupler, &s_coupler);
-    double c_rocker, s_rocker;
-    far |= cos_sin(phi_rocker, exact, &c_rocker, &s_rocker);
+    const double c_crank = at->of_angles[0][lane];
+    const double s_crank = at->of_angles[1][lane];
+    const double c_coupler = at->of_angles[2][lane];
+    const double s_coupler = at->of_angles[3][lane];
+    const double c_rocker = at->of_angles[4][lane];
+    const double s_rocker = at->of_angles[5][lane];
     // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
     const double phi_crank_dot_sq = square(phi_crank_dot);
     const double a_2 = a / 2.0;
@@ -314,7 +333,6 @@ _always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
     at->gamma[7][lane] = D_rocker_w2_y;
     // 8  AbsoluteAngle "motor": crank angle omega*t
     at->gamma[8][lane] = 0.0;
-    return far;
 }
 
 static void gamma_of_strip(strip *at, size_t count)
@@ -322,24 +340,35 @@ static void gamma_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= gamma_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= gamma_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        gamma_at(at, lane, 1);
+        gamma_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        gamma_at(at, lane);
 }
 
 // Phi, Phi_q, nu and gamma in one go.
-_always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
+_always_inline int64_t kinematics_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double phi_crank = at->q[2][lane];
+    const double phi_coupler = at->q[5][lane];
+    const double phi_rocker = at->q[8][lane];
+    far = far | cos_sin(phi_crank, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    far = far | cos_sin(phi_coupler, exact, &at->of_angles[2][lane], &at->of_angles[3][lane]);
+    far = far | cos_sin(phi_rocker, exact, &at->of_angles[4][lane], &at->of_angles[5][lane]);
+    return far;
+}
+
+_always_inline void kinematics_at(strip *at, size_t lane)
+{
     const double x_crank = at->q[0][lane];
     const double y_crank = at->q[1][lane];
     const double phi_crank = at->q[2][lane];
     const double x_coupler = at->q[3][lane];
     const double y_coupler = at->q[4][lane];
-    const double phi_coupler = at->q[5][lane];
     const double x_rocker = at->q[6][lane];
     const double y_rocker = at->q[7][lane];
-    const double phi_rocker = at->q[8][lane];
     const double phi_crank_dot = at->q_dot[2][lane];
     const double phi_coupler_dot = at->q_dot[5][lane];
     const double phi_rocker_dot = at->q_dot[8][lane];
@@ -350,12 +379,12 @@ _always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
     const double omega = at->p[4][lane];
     const double t = at->t[lane];
     // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_coupler, s_coupler;
-    far |= cos_sin(phi_coupler, exact, &c_coupler, &s_coupler);
-    double c_rocker, s_rocker;
-    far |= cos_sin(phi_rocker, exact, &c_rocker, &s_rocker);
+    const double c_crank = at->of_angles[0][lane];
+    const double s_crank = at->of_angles[1][lane];
+    const double c_coupler = at->of_angles[2][lane];
+    const double s_coupler = at->of_angles[3][lane];
+    const double c_rocker = at->of_angles[4][lane];
+    const double s_rocker = at->of_angles[5][lane];
     // 0-1  Revolute "A": crank (-a/2, 0) - ground (0, 0)
     const double a_2 = a / 2.0;
     const double B_crank_x = a_2 * c_crank;
@@ -435,7 +464,6 @@ _always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
     at->gamma[7][lane] = D_rocker_w2_y;
     // 8  AbsoluteAngle "motor": crank angle omega*t
     at->gamma[8][lane] = 0.0;
-    return far;
 }
 
 static void kinematics_of_strip(strip *at, size_t count)
@@ -443,9 +471,11 @@ static void kinematics_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= kinematics_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= kinematics_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        kinematics_at(at, lane, 1);
+        kinematics_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        kinematics_at(at, lane);
 }
 
 // Factor Phi_q; also return the determinants of its blocks.

@@ -88,6 +88,7 @@ typedef struct {
     double Phi_q[6][LANES];
     double nu[3][LANES];
     double gamma[3][LANES];
+    double of_angles[2][LANES];  // cosines and sines
     line on;
     double ends[K > 0 ? K : 1][LANES];
 } strip;
@@ -159,16 +160,22 @@ _always_inline double sine(double angle, int exact, int64_t *far)
 }
 
 // Phi and Phi_q in one go: a step of Newton's method.
-_always_inline int64_t position_at(strip *at, size_t lane, int exact)
+_always_inline int64_t position_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double phi3 = at->q[2][lane];
+    far = far | cos_sin(phi3, exact, &at->of_angles[1][lane], &at->of_angles[0][lane]);
+    return far;
+}
+
+_always_inline void position_at(strip *at, size_t lane)
+{
     const double x2 = at->q[0][lane];
     const double y2 = at->q[1][lane];
-    const double phi3 = at->q[2][lane];
     const double t = at->t[lane];
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    const double equation_1_1 = sine(phi3, exact, &far) / 4.0;
-    const double equation_1_2 = cosine(phi3, exact, &far) / 4.0;
+    const double equation_1_1 = at->of_angles[0][lane] / 4.0;
+    const double equation_1_2 = at->of_angles[1][lane] / 4.0;
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
     at->Phi[0][lane] = x2 + equation_1_1 - 3.0 / 5.0;
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
@@ -182,7 +189,6 @@ _always_inline int64_t position_at(strip *at, size_t lane, int exact)
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
     at->Phi_q[4][lane] = 2.0 * x2;  // equation_3 by x2
     at->Phi_q[5][lane] = 2.0 * y2;  // equation_3 by y2
-    return far;
 }
 
 static void position_of_strip(strip *at, size_t count)
@@ -190,9 +196,11 @@ static void position_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= position_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= position_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        position_at(at, lane, 1);
+        position_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        position_at(at, lane);
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
@@ -215,22 +223,27 @@ static void nu_of_strip(strip *at, size_t count)
 }
 
 // Right side of the acceleration equation Phi_q q_ddot = gamma.
-_always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
+_always_inline int64_t gamma_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double phi3 = at->q[2][lane];
+    far = far | cos_sin(phi3, exact, &at->of_angles[1][lane], &at->of_angles[0][lane]);
+    return far;
+}
+
+_always_inline void gamma_at(strip *at, size_t lane)
+{
     const double x2_dot = at->q_dot[0][lane];
     const double y2_dot = at->q_dot[1][lane];
     const double phi3_dot = at->q_dot[2][lane];
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
     const double phi3_dot_sq = square(phi3_dot);
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    at->gamma[0][lane] = phi3_dot_sq * sine(phi3, exact, &far) / 4.0;
+    at->gamma[0][lane] = phi3_dot_sq * at->of_angles[0][lane] / 4.0;
     // 1  Equation "equation_2": y2 - cos(phi3)/4 = 0
-    at->gamma[1][lane] = -phi3_dot_sq * cosine(phi3, exact, &far) / 4.0;
+    at->gamma[1][lane] = -phi3_dot_sq * at->of_angles[1][lane] / 4.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
     at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * (square(x2_dot) + square(y2_dot));
-    return far;
 }
 
 static void gamma_of_strip(strip *at, size_t count)
@@ -238,26 +251,34 @@ static void gamma_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= gamma_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= gamma_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        gamma_at(at, lane, 1);
+        gamma_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        gamma_at(at, lane);
 }
 
 // Phi, Phi_q, nu and gamma in one go.
-_always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
+_always_inline int64_t kinematics_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double phi3 = at->q[2][lane];
+    far = far | cos_sin(phi3, exact, &at->of_angles[1][lane], &at->of_angles[0][lane]);
+    return far;
+}
+
+_always_inline void kinematics_at(strip *at, size_t lane)
+{
     const double x2 = at->q[0][lane];
     const double y2 = at->q[1][lane];
-    const double phi3 = at->q[2][lane];
     const double x2_dot = at->q_dot[0][lane];
     const double y2_dot = at->q_dot[1][lane];
     const double phi3_dot = at->q_dot[2][lane];
     const double t = at->t[lane];
     // 0  Equation "equation_1": x2 + sin(phi3)/4 - 3/5 = 0
-    const double sin_phi3 = sine(phi3, exact, &far);
+    const double sin_phi3 = at->of_angles[0][lane];
     const double sin_phi3_4 = sin_phi3 / 4.0;
-    const double cos_phi3 = cosine(phi3, exact, &far);
+    const double cos_phi3 = at->of_angles[1][lane];
     const double cos_phi3_4 = cos_phi3 / 4.0;
     const double phi3_dot_sq = square(phi3_dot);
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
@@ -287,7 +308,6 @@ _always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
     at->gamma[1][lane] = -phi3_dot_sq * cos_phi3 / 4.0;
     // 2  Equation "equation_3": x2**2 + y2**2 - (t/10 + 2/5)**2 = 0
     at->gamma[2][lane] = 1.0 / 50.0 - 2.0 * (square(x2_dot) + square(y2_dot));
-    return far;
 }
 
 static void kinematics_of_strip(strip *at, size_t count)
@@ -295,9 +315,11 @@ static void kinematics_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= kinematics_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= kinematics_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        kinematics_at(at, lane, 1);
+        kinematics_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        kinematics_at(at, lane);
 }
 
 // Factor Phi_q; also return the determinants of its blocks.

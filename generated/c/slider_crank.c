@@ -100,6 +100,7 @@ typedef struct {
     double Phi_q[21][LANES];
     double nu[9][LANES];
     double gamma[9][LANES];
+    double of_angles[4][LANES];  // cosines and sines
     line on;
     double ends[K > 0 ? K : 1][LANES];
 } strip;
@@ -157,24 +158,32 @@ _always_inline int64_t cos_sin(double angle, int exact, double *cosine, double *
 }
 
 // Phi and Phi_q in one go: a step of Newton's method.
-_always_inline int64_t position_at(strip *at, size_t lane, int exact)
+_always_inline int64_t position_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double phi_crank = at->q[2][lane];
+    const double phi_rod = at->q[5][lane];
+    far = far | cos_sin(phi_crank, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    far = far | cos_sin(phi_rod, exact, &at->of_angles[2][lane], &at->of_angles[3][lane]);
+    return far;
+}
+
+_always_inline void position_at(strip *at, size_t lane)
+{
     const double x_crank = at->q[0][lane];
     const double y_crank = at->q[1][lane];
     const double phi_crank = at->q[2][lane];
     const double x_rod = at->q[3][lane];
     const double y_rod = at->q[4][lane];
-    const double phi_rod = at->q[5][lane];
     const double x_slider = at->q[6][lane];
     const double y_slider = at->q[7][lane];
     const double phi_slider = at->q[8][lane];
     const double t = at->t[lane];
     // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_rod, s_rod;
-    far |= cos_sin(phi_rod, exact, &c_rod, &s_rod);
+    const double c_crank = at->of_angles[0][lane];
+    const double s_crank = at->of_angles[1][lane];
+    const double c_rod = at->of_angles[2][lane];
+    const double s_rod = at->of_angles[3][lane];
     // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
     const double crank_pin_crank_x = 2.0 * c_crank;
     const double crank_pin_crank_y = 2.0 * s_crank;
@@ -207,7 +216,6 @@ _always_inline int64_t position_at(strip *at, size_t lane, int exact)
     // 4-5  Revolute "wrist_pin": rod (3, 0) - slider (0, 0)
     at->Phi_q[13][lane] = -wrist_pin_rod_y;  // wrist_pin.x by phi_rod
     at->Phi_q[16][lane] = wrist_pin_rod_x;  // wrist_pin.y by phi_rod
-    return far;
 }
 
 static void position_of_strip(strip *at, size_t count)
@@ -215,9 +223,11 @@ static void position_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= position_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= position_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        position_at(at, lane, 1);
+        position_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        position_at(at, lane);
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
@@ -249,18 +259,25 @@ static void nu_of_strip(strip *at, size_t count)
 }
 
 // Right side of the acceleration equation Phi_q q_ddot = gamma.
-_always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
+_always_inline int64_t gamma_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double phi_crank = at->q[2][lane];
     const double phi_rod = at->q[5][lane];
+    far = far | cos_sin(phi_crank, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    far = far | cos_sin(phi_rod, exact, &at->of_angles[2][lane], &at->of_angles[3][lane]);
+    return far;
+}
+
+_always_inline void gamma_at(strip *at, size_t lane)
+{
     const double phi_crank_dot = at->q_dot[2][lane];
     const double phi_rod_dot = at->q_dot[5][lane];
     // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_rod, s_rod;
-    far |= cos_sin(phi_rod, exact, &c_rod, &s_rod);
+    const double c_crank = at->of_angles[0][lane];
+    const double s_crank = at->of_angles[1][lane];
+    const double c_rod = at->of_angles[2][lane];
+    const double s_rod = at->of_angles[3][lane];
     // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
     const double phi_crank_dot_sq = square(phi_crank_dot);
     const double crank_pin_crank_w2_x = phi_crank_dot_sq * (2.0 * c_crank);
@@ -284,7 +301,6 @@ _always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
     at->gamma[7][lane] = 0.0;
     // 8  AbsoluteAngle "motor": crank angle t**2
     at->gamma[8][lane] = 2.0;
-    return far;
 }
 
 static void gamma_of_strip(strip *at, size_t count)
@@ -292,21 +308,31 @@ static void gamma_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= gamma_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= gamma_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        gamma_at(at, lane, 1);
+        gamma_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        gamma_at(at, lane);
 }
 
 // Phi, Phi_q, nu and gamma in one go.
-_always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
+_always_inline int64_t kinematics_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double phi_crank = at->q[2][lane];
+    const double phi_rod = at->q[5][lane];
+    far = far | cos_sin(phi_crank, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    far = far | cos_sin(phi_rod, exact, &at->of_angles[2][lane], &at->of_angles[3][lane]);
+    return far;
+}
+
+_always_inline void kinematics_at(strip *at, size_t lane)
+{
     const double x_crank = at->q[0][lane];
     const double y_crank = at->q[1][lane];
     const double phi_crank = at->q[2][lane];
     const double x_rod = at->q[3][lane];
     const double y_rod = at->q[4][lane];
-    const double phi_rod = at->q[5][lane];
     const double x_slider = at->q[6][lane];
     const double y_slider = at->q[7][lane];
     const double phi_slider = at->q[8][lane];
@@ -314,10 +340,10 @@ _always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
     const double phi_rod_dot = at->q_dot[5][lane];
     const double t = at->t[lane];
     // body frames: A = [[c, -s], [s, c]]
-    double c_crank, s_crank;
-    far |= cos_sin(phi_crank, exact, &c_crank, &s_crank);
-    double c_rod, s_rod;
-    far |= cos_sin(phi_rod, exact, &c_rod, &s_rod);
+    const double c_crank = at->of_angles[0][lane];
+    const double s_crank = at->of_angles[1][lane];
+    const double c_rod = at->of_angles[2][lane];
+    const double s_rod = at->of_angles[3][lane];
     // 0-1  Revolute "main_bearing": crank (-2, 0) - ground (0, 0)
     const double crank_pin_crank_x = 2.0 * c_crank;
     const double crank_pin_crank_y = 2.0 * s_crank;
@@ -386,7 +412,6 @@ _always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
     at->gamma[7][lane] = 0.0;
     // 8  AbsoluteAngle "motor": crank angle t**2
     at->gamma[8][lane] = 2.0;
-    return far;
 }
 
 static void kinematics_of_strip(strip *at, size_t count)
@@ -394,9 +419,11 @@ static void kinematics_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= kinematics_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= kinematics_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        kinematics_at(at, lane, 1);
+        kinematics_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        kinematics_at(at, lane);
 }
 
 // Factor Phi_q; also return the determinants of its blocks.

@@ -152,6 +152,7 @@ typedef struct {
     double outputs_dot[4][LANES];
     double outputs_ddot[4][LANES];
     double outputs_q[21][LANES];
+    double of_angles[2][LANES];  // cosines and sines
     line on;
     double ends[K > 0 ? K : 1][LANES];
 } strip;
@@ -244,9 +245,18 @@ _always_inline double angle_of(double y, double x)
 }
 
 // Phi and Phi_q in one go: a step of Newton's method.
-_always_inline int64_t position_at(strip *at, size_t lane, int exact)
+_always_inline int64_t position_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double omega = at->p[2][lane];
+    const double t = at->t[lane];
+    const double motor_C = omega * t;
+    far = far | cos_sin(motor_C, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    return far;
+}
+
+_always_inline void position_at(strip *at, size_t lane)
+{
     const double x_crank = at->q[0][lane];
     const double y_crank = at->q[1][lane];
     const double z_crank = at->q[2][lane];
@@ -270,8 +280,6 @@ _always_inline int64_t position_at(strip *at, size_t lane, int exact)
     const double e3_slider = at->q[20][lane];
     const double crank = at->p[0][lane];
     const double rod = at->p[1][lane];
-    const double omega = at->p[2][lane];
-    const double t = at->t[lane];
     // body frames: A = (e0^2 - e^T e) I + 2 e e^T + 2 e0 e~
     const double frame_1 = e3_crank + e3_crank;
     const double frame_2 = e1_crank * frame_1;
@@ -340,9 +348,8 @@ _always_inline int64_t position_at(strip *at, size_t lane, int exact)
     const double B_3 = 2.0 * e2_slider;
     const double B_4 = 2.0 * e1_slider;
     // 17  RelativeRotation "motor": ground axis (1, 0, 0) axis (0, 0, 1) - crank axis (1, 0, 0) axis (0, 0, 1) angle omega*t
-    const double motor_C = omega * t;
-    const double cos_motor_C = cosine(motor_C, exact, &far);
-    const double sin_motor_C = sine(motor_C, exact, &far);
+    const double cos_motor_C = at->of_angles[0][lane];
+    const double sin_motor_C = at->of_angles[1][lane];
     const double motor_4 = A23_crank * cos_motor_C + A33_crank * sin_motor_C;
     const double motor_5 = A33_crank * cos_motor_C - A23_crank * sin_motor_C;
     const double motor_6 = O_3 * cos_motor_C - O_4 * sin_motor_C;
@@ -467,7 +474,6 @@ _always_inline int64_t position_at(strip *at, size_t lane, int exact)
     at->Phi_q[94][lane] = B_4;  // norm_slider by e1_slider
     at->Phi_q[95][lane] = B_3;  // norm_slider by e2_slider
     at->Phi_q[96][lane] = B_2;  // norm_slider by e3_slider
-    return far;
 }
 
 static void position_of_strip(strip *at, size_t count)
@@ -475,29 +481,38 @@ static void position_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= position_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= position_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        position_at(at, lane, 1);
+        position_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        position_at(at, lane);
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
-_always_inline int64_t nu_at(strip *at, size_t lane, int exact)
+_always_inline int64_t nu_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double omega = at->p[2][lane];
+    const double t = at->t[lane];
+    const double motor_C = omega * t;
+    far = far | cos_sin(motor_C, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    return far;
+}
+
+_always_inline void nu_at(strip *at, size_t lane)
+{
     const double e0_crank = at->q[3][lane];
     const double e1_crank = at->q[4][lane];
     const double e2_crank = at->q[5][lane];
     const double e3_crank = at->q[6][lane];
     const double omega = at->p[2][lane];
-    const double t = at->t[lane];
     // body frames: A = (e0^2 - e^T e) I + 2 e e^T + 2 e0 e~
     const double A23_crank = e2_crank * (e3_crank + e3_crank) - e0_crank * (e1_crank + e1_crank);
     const double A33_crank = square(e0_crank) + square(e3_crank) - (square(e1_crank) + square(e2_crank));
     // 17  RelativeRotation "motor": ground axis (1, 0, 0) axis (0, 0, 1) - crank axis (1, 0, 0) axis (0, 0, 1) angle omega*t
-    const double motor_C = omega * t;
-    const double cos_motor_C = cosine(motor_C, exact, &far);
+    const double cos_motor_C = at->of_angles[0][lane];
     const double A33_crank_cos_motor_C = A33_crank * cos_motor_C;
-    const double sin_motor_C = sine(motor_C, exact, &far);
+    const double sin_motor_C = at->of_angles[1][lane];
     const double A23_crank_sin_motor_C = A23_crank * sin_motor_C;
     const double motor_6 = A33_crank_cos_motor_C - A23_crank_sin_motor_C;
     const double A23_crank_cos_motor_C = A23_crank * cos_motor_C;
@@ -534,7 +549,6 @@ _always_inline int64_t nu_at(strip *at, size_t lane, int exact)
     at->nu[19][lane] = 0.0;
     // 20  Normalization "norm_slider": slider
     at->nu[20][lane] = 0.0;
-    return far;
 }
 
 static void nu_of_strip(strip *at, size_t count)
@@ -542,15 +556,26 @@ static void nu_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= nu_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= nu_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        nu_at(at, lane, 1);
+        nu_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        nu_at(at, lane);
 }
 
 // Right side of the acceleration equation Phi_q q_ddot = gamma.
-_always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
+_always_inline int64_t gamma_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double omega = at->p[2][lane];
+    const double t = at->t[lane];
+    const double motor_C = omega * t;
+    far = far | cos_sin(motor_C, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    return far;
+}
+
+_always_inline void gamma_at(strip *at, size_t lane)
+{
     const double e0_crank = at->q[3][lane];
     const double e1_crank = at->q[4][lane];
     const double e2_crank = at->q[5][lane];
@@ -578,7 +603,6 @@ _always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
     const double crank = at->p[0][lane];
     const double rod = at->p[1][lane];
     const double omega = at->p[2][lane];
-    const double t = at->t[lane];
     // body frames: A = (e0^2 - e^T e) I + 2 e e^T + 2 e0 e~
     const double A23_crank = e2_crank * (e3_crank + e3_crank) - e0_crank * (e1_crank + e1_crank);
     const double A33_crank = square(e0_crank) + square(e3_crank) - (square(e1_crank) + square(e2_crank));
@@ -627,10 +651,9 @@ _always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
     const double B_7 = e1_slider_dot * B_5 + e0_slider_dot * B_6;
     const double B_8 = e1_slider_dot * B_6 - e0_slider_dot * B_5;
     // 17  RelativeRotation "motor": ground axis (1, 0, 0) axis (0, 0, 1) - crank axis (1, 0, 0) axis (0, 0, 1) angle omega*t
-    const double motor_C = omega * t;
-    const double cos_motor_C = cosine(motor_C, exact, &far);
+    const double cos_motor_C = at->of_angles[0][lane];
     const double A23_crank_cos_motor_C = A23_crank * cos_motor_C;
-    const double sin_motor_C = sine(motor_C, exact, &far);
+    const double sin_motor_C = at->of_angles[1][lane];
     const double A33_crank_sin_motor_C = A33_crank * sin_motor_C;
     const double motor_6 = A23_crank_cos_motor_C + A33_crank_sin_motor_C;
     const double motor_7 = e0_crank * A_16 + e3_crank * O_3 - (e1_crank * A_9 + e2_crank * O_1);
@@ -708,7 +731,6 @@ _always_inline int64_t gamma_at(strip *at, size_t lane, int exact)
     // 20  Normalization "norm_slider": slider
     at->gamma[20][lane] = -2.0 * (square(e0_slider_dot) + square(e1_slider_dot) + square(e2_slider_dot)
             + square(e3_slider_dot));
-    return far;
 }
 
 static void gamma_of_strip(strip *at, size_t count)
@@ -716,9 +738,11 @@ static void gamma_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= gamma_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= gamma_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        gamma_at(at, lane, 1);
+        gamma_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        gamma_at(at, lane);
 }
 
 // Jacobian of the outputs by q.
@@ -772,9 +796,18 @@ static void outputs_q_of_strip(strip *at, size_t count)
 }
 
 // Phi, Phi_q, nu and gamma in one go.
-_always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
+_always_inline int64_t kinematics_angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
+    const double omega = at->p[2][lane];
+    const double t = at->t[lane];
+    const double motor_C = omega * t;
+    far = far | cos_sin(motor_C, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
+    return far;
+}
+
+_always_inline void kinematics_at(strip *at, size_t lane)
+{
     const double x_crank = at->q[0][lane];
     const double y_crank = at->q[1][lane];
     const double z_crank = at->q[2][lane];
@@ -811,7 +844,6 @@ _always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
     const double crank = at->p[0][lane];
     const double rod = at->p[1][lane];
     const double omega = at->p[2][lane];
-    const double t = at->t[lane];
     // body frames: A = (e0^2 - e^T e) I + 2 e e^T + 2 e0 e~
     const double frame_1 = e3_crank + e3_crank;
     const double frame_2 = e1_crank * frame_1;
@@ -911,10 +943,9 @@ _always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
     const double B_11 = e1_slider_dot * B_9 + e0_slider_dot * B_10;
     const double B_12 = e1_slider_dot * B_10 - e0_slider_dot * B_9;
     // 17  RelativeRotation "motor": ground axis (1, 0, 0) axis (0, 0, 1) - crank axis (1, 0, 0) axis (0, 0, 1) angle omega*t
-    const double motor_C = omega * t;
-    const double cos_motor_C = cosine(motor_C, exact, &far);
+    const double cos_motor_C = at->of_angles[0][lane];
     const double A23_crank_cos_motor_C = A23_crank * cos_motor_C;
-    const double sin_motor_C = sine(motor_C, exact, &far);
+    const double sin_motor_C = at->of_angles[1][lane];
     const double A33_crank_sin_motor_C = A33_crank * sin_motor_C;
     const double motor_6 = A23_crank_cos_motor_C + A33_crank_sin_motor_C;
     const double A33_crank_cos_motor_C = A33_crank * cos_motor_C;
@@ -1143,7 +1174,6 @@ _always_inline int64_t kinematics_at(strip *at, size_t lane, int exact)
     // 20  Normalization "norm_slider": slider
     at->gamma[20][lane] = -2.0 * (square(e0_slider_dot) + square(e1_slider_dot) + square(e2_slider_dot)
             + square(e3_slider_dot));
-    return far;
 }
 
 static void kinematics_of_strip(strip *at, size_t count)
@@ -1151,9 +1181,11 @@ static void kinematics_of_strip(strip *at, size_t count)
     int64_t far = 0;
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        far |= kinematics_at(at, lane, 0) & -(int64_t)(lane < count);
+        far |= kinematics_angles_at(at, lane, 0) & -(int64_t)(lane < count);
     for (size_t lane = 0; far && lane < count; lane++)
-        kinematics_at(at, lane, 1);
+        kinematics_angles_at(at, lane, 1);
+    for (size_t lane = 0; lane < all; lane++)
+        kinematics_at(at, lane);
 }
 
 // Outputs y, y_dot and y_ddot in one go.

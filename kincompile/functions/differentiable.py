@@ -91,7 +91,7 @@ def _motion(module: ModuleType, times: ArrayLike) -> Callable[..., Any]:
 
     def motion(t: Any, p: Any = defaults) -> tuple[Any, Any, Any]:
         """Return q, q_dot and q_ddot (n,) at a time t and with parameters p (k,)."""
-        t, p = jnp.asarray(t, dtype=float), _vector(p, defaults, "p", module.PARAMETERS)
+        t, p = _numbers(t, (), "t", "one time"), _vector(p, defaults, "p", module.PARAMETERS)
         q = position(t, p)
         factors, is_missing = linear(q, t, p)[1], ~jnp.isfinite(q).all()  # a driven rate is known
         q_dot = jnp.where(is_missing, jnp.nan, solved(factors, lanes["nu"](q, t, p)))
@@ -129,13 +129,20 @@ def _outputs(f: Transmission) -> Callable[..., Any]:
 
 def _vector(given: Any, like: Any, what: str, names: tuple[str, ...]) -> Any:
     """Return a vector, checked."""
+    return _numbers(given, like.shape, what, f"{len(names)} numbers, {', '.join(names) or 'none'}")
+
+
+def _numbers(given: Any, shape: tuple[int, ...], what: str, wanted: str) -> Any:
+    """Return real numbers of a shape."""
     import jax.numpy as jnp
 
+    if isinstance(given, dict) or jnp.iscomplexobj(given):
+        kind = "a mapping" if isinstance(given, dict) else "complex"
+        raise InputError(f"{what} is {kind}: give {wanted}, as an array of real numbers.")
     found = jnp.asarray(given, dtype=float)
-    if found.shape != like.shape:
+    if found.shape != shape:
         raise InputError(
-            f"{what} has the shape {found.shape}: give {len(names)} numbers, "
-            f"{', '.join(names) or 'none'}. For a batch use jax.vmap."
+            f"{what} has the shape {found.shape}: give {wanted}. For a batch use jax.vmap."
         )
     return found
 

@@ -69,6 +69,7 @@ static int run(fmi3Instance unit, fmi3ValueReference all, int turn)
     NEED(fmi3GetFloat64(unit, NULL, 0, NULL, 0));
     NEED(fmi3FreeFMUState(unit, &kept));
     NEED(fmi3FreeFMUState(unit, &again));
+    NEED(fmi3FreeFMUState(unit, NULL)); // is ignored, as FMI 3.0 says
     NEED(fmi3Reset(unit));
     free(bytes);
     return 0;

@@ -49,7 +49,7 @@ OWN = ("-D_WITHOUT_START",)
 
 QUICK = (
     "-O2", "-D_WHOLE_REGISTERS", "-ftree-vectorize", "-fvect-cost-model", "-funswitch-loops",
-    "-fno-tree-pre", "-fno-gcse", "-fno-tree-vrp", "-fno-tree-dominator-opts", "-fno-thread-jumps",
+    "-fno-tree-pre", "-fno-tree-vrp", "-fno-tree-dominator-opts", "-fno-thread-jumps",
     "-fno-rerun-cse-after-loop", "-fno-cse-follow-jumps",
 )  # fmt: skip
 """Loops over points take several at once, as with -O3, for which gcc takes up to twice as long.

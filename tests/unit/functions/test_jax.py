@@ -142,6 +142,12 @@ def test_that_single_precision_is_refused(four_bar):
 
 def test_that_wrong_arguments_are_named(four_bar):
     _, f = four_bar
+    with pytest.raises(kc.InputError, match=r"t has the shape \(2,\): give one time. For a batch"):
+        f(np.zeros(2))
+    with pytest.raises(kc.InputError, match=r"t is complex: give one time, as an array of real"):
+        f(0.1 + 1j)
+    with pytest.raises(kc.InputError, match=r"p is a mapping: give 5 numbers, a, b, c"):
+        f(0.1, {"a": 8.0})
     with pytest.raises(kc.InputError, match=r"p has the shape \(3,\): give 5 numbers, a, b, c"):
         f(0.0, np.ones(3))
 

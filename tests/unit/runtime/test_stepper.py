@@ -413,7 +413,7 @@ def test_that_numbers_of_a_step_in_c_begin_with_a_line_of_the_cache():
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickle.dumps])
 def test_that_it_cannot_be_copied(example_named, target, copied):
-    step = kc.stepper(compile_for(example_named("four_bar"), target))
+    step = kc.stepper(compile_for(example_named("four_bar").model, target))
     with pytest.raises(InputError, match=r"four_bar cannot be copied or pickled. Make another"):
         copied(step)
 
