@@ -41,6 +41,9 @@ __all__ = [
 ]  # fmt: skip
 
 
+MOST_POINTS = 1000
+"""Precision points."""
+
 SAME = 1e-3
 """Part of the length of a link up to which two pivots are one that was found twice."""
 
@@ -50,8 +53,10 @@ def chebyshev_spacing(start: float, end: float, count: int) -> Array:
 
     An error that is a polynomial of degree `count` is least between them.
     """
-    if count < 1:
+    ends = read([start, end], "start and end")
+    if not (isinstance(count, int) and 1 <= count <= MOST_POINTS):
         raise InputError(f"count is {count!r}. Give how many precision points, such as 3.")
+    start, end = ends.tolist()
     angles = np.pi * (2 * np.arange(count) + 1) / (2 * count)
     return np.asarray((start + end) / 2 - (end - start) / 2 * np.cos(angles))
 

@@ -50,6 +50,9 @@ PLACES = 25
 """Equally spaced times at which a path or a dwell is looked at."""
 
 
+POSITIVE = "give positive numbers"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Passing:
     """Columns are to have values: at times, or one after the other at times that are found.
@@ -262,6 +265,8 @@ def time_ratio(
     found = _number(ratio, f"the time ratio of {column!r}")
     if not found > 0:
         raise InputError(f"the time ratio of {column!r} is {found:g}: give a positive number")
+    if not (weight > 0 and within > 0):
+        raise InputError(f"the time ratio of {column!r} has weight and within: {POSITIVE}")
     return TimeRatio(column_name(column), found, float(weight), float(within))
 
 
@@ -436,7 +441,7 @@ def _shaped(
             f"{title} is asked for between {shown(between)}: give the first time first"
         )
     if not (weight > 0 and within > 0):
-        raise InputError(f"{title} has weight and within: give positive numbers")
+        raise InputError(f"{title} has weight and within: {POSITIVE}")
     times = np.linspace(ends[0], ends[1], PLACES)
     return Shaped(title, columns, nearest, given, times, float(weight), float(within))
 
@@ -459,6 +464,8 @@ def _passing(
         problems.append(f"the times of {title} do not rise: give them in their order, each once")
     if not (np.isfinite(weights).all() and (weights > 0).all()):
         problems.append(f"{title} has the weight {weights.min():g}: give a positive number")
+    if within is not None and not within > 0:
+        problems.append(f"{title} is to be within {within:g}: give a positive number")
     if between is not None and not between[0] < between[1]:
         problems.append(
             f"{title} is to happen between {between[0]:g} and {between[1]:g}: give the first time "

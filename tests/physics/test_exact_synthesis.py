@@ -178,6 +178,9 @@ FIVE = poses_at(AROUND).tolist()
         (lambda s: s.FourBar((0, 0), (1, 0), (1, 0), (0, 1), (2, 2)), "are in one place. Give it"),
         (lambda s: s.path(FIVE, AROUND), "Give five of both"),
         (lambda s: s.chebyshev_spacing(0, 1, 0), "count is 0. Give how many precision points"),
+        (lambda s: s.chebyshev_spacing(0, 1, 1.5), "count is 1.5. Give how many precision points"),
+        (lambda s: s.chebyshev_spacing(0, 1, 10**12), "Give how many precision points"),
+        (lambda s: s.chebyshev_spacing(math.nan, 1, 3), "start and end: a number is not finite"),
         (lambda s: s.four_bar(*s.dyads(FIVE)[:2], FIVE[0]), r"have the shape \(3,\)"),
         (lambda s: s.four_bar(*s.dyads(FIVE)[:1] * 2, FIVE), "Two pivots are one"),
         (

@@ -8,6 +8,7 @@ definition of a deviation, for results and for the targets of `kc.fit`.
 from __future__ import annotations
 
 import math
+import numbers
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -217,7 +218,7 @@ def path_deviation(
     if any(name.startswith("e0_") for name in solution.coordinates):
         raise InputError(f"{solution.name} moves in space: paths are compared in the plane only.")
     times, inside = _part(solution, between)
-    names = path_columns(solution, point)
+    names, given = path_columns(solution, point), _read_shape(shape, given)
     curves = [_curve(solution, name) for name in names]
     values = np.column_stack([curve(times) for curve in curves])[inside]
     times = times[inside]
@@ -229,6 +230,28 @@ def path_deviation(
         float(np.sqrt(np.mean(found.offsets**2))), (*found.place.tolist(),), direction,
         found.radius, float(times[0]), float(times[-1]),
     )  # fmt: skip
+
+
+SHAPES = {
+    "line": ((2, 2), "a line is two places apart, such as ((0, 1), (2, 1))"),
+    "circle": ((3,), "a circle is x, y and a positive radius, such as (0, 0, 1)"),
+}
+"""The numbers of a line and of a circle, and how they are given."""
+
+
+def _read_shape(shape: str, given: Any) -> Any:
+    """Return a line or a circle as numbers, or None where it is to be found."""
+    if given is None:
+        return None
+    form, how = SHAPES[shape]
+    try:
+        found = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        found = np.array(np.nan)
+    fits = found.shape == form and bool(np.isfinite(found).all())
+    if not (fits and (found[-1] > 0 if shape == "circle" else (found[0] != found[1]).any())):
+        raise InputError(f"the {shape} is {shown(given)}: {how}")
+    return found
 
 
 def path_columns(solution: MotionTable, point: str) -> tuple[str, str]:
@@ -284,14 +307,14 @@ def dwell(
 ) -> Dwell:
     """Find the longest dwell of a column, as `Solution.dwell` describes."""
     solution.require_one_motion("a dwell is that of", "take a variant: .variant(0)")
-    if not within > 0:
-        raise InputError(f"the dwell of {name} within {within:g}: give a positive tolerance")
+    if not (isinstance(within, numbers.Real) and within > 0):
+        raise InputError(f"the dwell of {name} within {shown(within)}: give a positive tolerance")
     column, curve = solution.column(name), _curve(solution, name)
     first, last = float(curve.x[0]), float(curve.x[-1])
     turning = curve.derivative().roots(extrapolate=False)
     y = curve(np.concatenate((curve.x, turning[np.isfinite(turning)])))
     level = {"max": float(y.max()), "min": float(y.min())}.get(at) if isinstance(at, str) else at
-    if level is None:
+    if not (isinstance(level, numbers.Real) and not math.isnan(level)):
         raise InputError(f"a dwell at {at!r}: give 'max', 'min' or a value")
     edge = within + STILL * float(np.abs(y).max())
     cuts = np.concatenate([curve.solve(level + side, extrapolate=False) for side in (-edge, edge)])
@@ -330,7 +353,7 @@ def _part(solution: MotionTable, between: Any) -> tuple[Array, Any]:
     good = np.unique(solution.t[_found(solution)])
     low, high, column = float(good[0]), float(good[-1]), ""
     if isinstance(between, dict) and len(between) == 1:
-        column, (least, most) = next(iter(between.items()))
+        column, (least, most) = next((name, _two(ends)) for name, ends in between.items())
     elif between is not None:
         least, most = _two(between)
         low, high = max(low, least), min(high, most)
@@ -354,10 +377,13 @@ def _two(given: Any) -> tuple[float, float]:
     """Return two numbers, the ends of a part."""
     try:
         low, high = (float(item) for item in given)
+        is_known = not (math.isnan(low) or math.isnan(high))
     except (TypeError, ValueError):
+        is_known = False
+    if not is_known:
         raise InputError(
             f"a part of the motion is {shown(given)}: give two times, or {{'crank.phi': (1, 2)}}"
-        ) from None
+        )
     return low, high
 
 

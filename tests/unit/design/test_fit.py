@@ -170,6 +170,14 @@ def test_a_circle_beside_a_time_ratio_and_a_dwell_that_is_far():
         ),
         (lambda: kc.targets.circular("P", (1, 2), circle=(0, 0, -1), within=1), "positive radius"),
         (lambda: kc.targets.dwell("P.x", (1, 2), at="top", within=1), "not a finite number"),
+        (
+            lambda: kc.targets.path("P", [(1, 1)], [0], within=-1),
+            "is to be within -1: give a positive",
+        ),
+        (
+            lambda: kc.targets.time_ratio("x", 1.2, within=-1),
+            "has weight and within: give positive",
+        ),
     ],
 )
 def test_shapes_that_cannot_be_asked_for(make, words):
