@@ -54,7 +54,7 @@ def chebyshev_spacing(start: float, end: float, count: int) -> Array:
     An error that is a polynomial of degree `count` is least between them.
     """
     ends = read([start, end], "start and end")
-    if not (isinstance(count, int) and 1 <= count <= MOST_POINTS):
+    if count != int(count) or not 1 <= count <= MOST_POINTS:
         raise InputError(f"count is {count!r}. Give how many precision points, such as 3.")
     start, end = ends.tolist()
     angles = np.pi * (2 * np.arange(count) + 1) / (2 * count)
