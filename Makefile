@@ -8,7 +8,8 @@ unexport PYTHONDONTWRITEBYTECODE
 
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check -c .ci/constraints.txt
+# Python compiles what is imported; pip would compile all that is installed, on one core.
+PIP := $(BIN)/python -m pip install -qq --no-compile --disable-pip-version-check -c .ci/constraints.txt
 PYTEST := $(BIN)/python -m pytest
 
 # Tests run in as many processes as there are cores. Threads of BLAS in each of them would wait for
