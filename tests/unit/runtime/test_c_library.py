@@ -316,6 +316,15 @@ def test_nothing_is_left_in_the_temporary_folder(monkeypatch, cache, tmp_path):
     assert list((tmp_path / "temporary").iterdir()) == []
 
 
+@pytest.mark.parametrize("level", [c_library.QUICK, c_library.FULL, ("-O1",)])
+def test_that_tests_build_without_optimization(quick_compiler, level):
+    """Else they take twice as long, and all of them pass."""
+    command = [os.environ["CC"], *level, "-dM", "-E", "-x", "c", os.devnull]
+    macros = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "__STDC__" in macros
+    assert "__OPTIMIZE__" not in macros
+
+
 def modes(folder: Path) -> set[int]:
     """Return the permissions of a folder and of what is in it."""
     return {stat.S_IMODE(path.lstat().st_mode) for path in (folder, *folder.iterdir())}
