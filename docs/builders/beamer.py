@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
     from markdown_it.token import Token
 
-GREEK = ("alpha", "gamma", "eta", "theta", "nu", "xi", "pi", "rho", "tau", "phi", "omega")
+GREEK = (
+    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "mu",
+    "nu", "xi", "pi", "rho", "sigma", "tau", "phi", "chi", "psi", "omega",
+)  # fmt: skip
 LETTERS = {lookup(f"GREEK SMALL LETTER {name}"): f"\\{name}" for name in GREEK} | {
     "Φ": r"\Phi", "Δ": r"\Delta", "λ": r"\lambda", "²": "{}^2", "³": "{}^3", "ᵀ": "{}^T",
     "·": r"\cdot", "°": r"{}^\circ", "√": r"\surd", "≥": r"\ge", "≤": r"\le", "≠": r"\ne",
@@ -35,6 +38,11 @@ PREAMBLE = r"""\documentclass[10pt,aspectratio=169]{beamer}
 \usepackage[utf8]{inputenc}
 \usepackage{amsmath}
 \let\phi\varphi
+\newsavebox{\fitbox}
+% A formula that is shrunk where it is wider than the slide.
+\newcommand{\fit}[1]{\sbox{\fitbox}{$\displaystyle #1$}%
+  \ifdim\wd\fitbox>\linewidth\resizebox{\linewidth}{!}{\usebox{\fitbox}}%
+  \else\usebox{\fitbox}\fi}
 \setlength{\unitlength}{1bp}
 \setbeamertemplate{navigation symbols}{}
 \setbeamertemplate{footline}[frame number]
@@ -101,7 +109,7 @@ class _Printer:
             if token.type == "inline":
                 yield self._inline(token.children or ())
             elif token.type == "fence" and token.info == "math":
-                yield rf"\[ {token.content.strip()} \]"
+                yield rf"\[ \fit{{{token.content.strip()}}} \]"
             elif token.type in ("fence", "code_block"):
                 yield f"{SMALL}{token.content}\\end{{verbatim}}\n\\endgroup"
             elif kind in lists:

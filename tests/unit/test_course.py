@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from unicodedata import normalize
 
 import pytest
 
@@ -96,6 +97,8 @@ def test_that_the_frames_of_beamer_are_those_of_the_slides(lesson):
     assert text.count(r"\begin{frame}") == lesson.text.count("\n## ") + 1
     assert text.count(r"\[ ") == lesson.text.count("```math")
     assert text.count(r"\begin{picture}") == 1
+    letters = {x for x in normalize("NFD", text) if not x.isascii()}
+    assert letters <= {*beamer.LETTERS, *beamer.DOTTED}  # else pdflatex stops
 
 
 @pytest.mark.slow
