@@ -214,7 +214,7 @@ def _graded(name: str) -> dict[str, Any]:
         "grade": True, "grade_id": name, "locked": True, "points": 1, "schema_version": 3,
         "solution": False, "task": False,
     }  # fmt: skip
-    made = _cell("code", name, f"# {name} is marked here.", execution_count=None, outputs=[])
+    made = _cell("code", name, UNMARKED.format(name=name), execution_count=None, outputs=[])
     return made | {"metadata": {"nbgrader": own}}
 
 
@@ -222,6 +222,13 @@ NOTEBOOK = """\
 Your mechanism and what is asked are on your page, `NN.html` or `NN/exercise.html`, where NN is the
 number of your sheet. Write that number and a formula after each `=` in the grey cell below.
 Formulas are marked as text: no cell is run, and what you add elsewhere is not read."""
+
+UNMARKED = """\
+# {name} is marked when the notebook is graded.
+### BEGIN HIDDEN TESTS
+raise RuntimeError("not marked: nbgrader_config.py lacks the lines of the exercise")
+### END HIDDEN TESTS"""
+"""Where nbgrader runs this itself, there are no points; students do not get the hidden part."""
 
 OTTER_TEST = """\
 from otter.test_files import test_case

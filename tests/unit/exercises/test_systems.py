@@ -554,6 +554,7 @@ def test_that_nbgrader_gives_the_points(made: Any, tmp_path: Path) -> None:
         "hand_in.ipynb", "01.html", "02.html", "03.html",
     }  # fmt: skip
     assert found_in(made, of_students(release, "")) == []
+    assert "not marked" not in (release / "hand_in.ipynb").read_text(encoding="utf-8")
     attack = ATTACK.format(mark=str(tmp_path / "ran"))
     for student, text in zip(("ann", "bob", "eve"), three(made), strict=True):
         own = folder / "submitted" / student / "arm"
@@ -586,4 +587,5 @@ def test_that_nbgrader_gives_the_points(made: Any, tmp_path: Path) -> None:
     assert not (tmp_path / "ran").exists()
     graded = (folder / "autograded" / "bob" / "arm" / "hand_in.ipynb").read_text(encoding="utf-8")
     assert "the entry has the wrong sign." in graded
+    assert graded.count("not marked: nbgrader_config.py lacks") == 4  # what would run without it
     assert "cannot be read: wobble(1)" in graded
