@@ -154,6 +154,15 @@ def shaft_in_two_bearings():
     return m
 
 
+def shaft_of_two_parts():
+    m = spatial.Mechanism("parts")
+    a, b = m.body("a", O), m.body("b", (0, 0, 1))
+    m.add(spatial.Revolute("A", m.ground, O, Z, a, O, Z))
+    m.add(spatial.Fixed("flange", a, (0, 0, 1), Z, X, b, O, Z, X))
+    m.add(spatial.Spherical("B", m.ground, (0, 0, 2), b, (0, 0, 1)))
+    return m
+
+
 def arm_with_a_tool():
     m = spatial.Mechanism("arm")
     arm, tool = m.body("arm", O), m.body("tool", (1, 0, 0))
@@ -208,6 +217,7 @@ CASES = {
         transmission_models.ankle_with_rods, ["spin of cylinder_left", "spin of cylinder_right"]
     ),
     "a shaft": (shaft_in_two_bearings, []),
+    "a shaft of two parts": (shaft_of_two_parts, []),
     "a tool": (arm_with_a_tool, []),
     "a shaft with a joint": (cardan_shaft_without_a_motor, []),
     "links": (double_pendulum, []),
