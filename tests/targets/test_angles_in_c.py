@@ -17,3 +17,15 @@ def test_that_atan2_is_right_to_two_units_in_the_last_place() -> None:
     q[:6, :2] = [(1, 0), (-1, 0), (0, 1), (0, -1), (0, 0), (1, 1)]
     found, wanted = -module.Phi(q, 0.0)[:, 2], np.arctan2(q[:, 1], q[:, 0])
     assert np.all(np.abs(found - wanted) <= 2 * np.spacing(np.abs(wanted)))
+
+
+def test_that_cosines_of_large_angles_are_those_of_the_library() -> None:
+    """Beyond 1e5 rad, in the same strip as small ones, and of a cosine of such an angle."""
+    x, y, z, angle = sympy.symbols("x y z angle")
+    turned = sympy.cos(angle)
+    equations = [x - turned, y - sympy.sin(angle), z - sympy.sin(7 * turned), angle - kc.t]
+    module = kc.compile(kc.ConstraintSystem("far", [x, y, z, angle], equations), target="c")
+    angles = np.array([0.3, -2e5, 1e9, 2.0, 1e15, -7.0])
+    q = np.column_stack([np.zeros((6, 3)), angles])
+    wanted = np.column_stack([np.cos(angles), np.sin(angles), np.sin(7 * np.cos(angles))])
+    np.testing.assert_allclose(-module.Phi(q, 0.0)[:, :3], wanted, rtol=0, atol=2e-15)
