@@ -45,7 +45,7 @@ SCRIPTS = (
     "player.js", "units.js", "draw.js", "stage.js", "poles.js", "forces.js",
     "tools.js", "tip.js", "columns.js",
     "plots.js", "tables.js", "showing.js", "newton.js", "newton_tables.js", "newton_stage.js",
-    "newton_panel.js", "sliders.js", "live.js", "settings.js", "measures.js", "grab.js",
+    "newton_panel.js", "sliders.js", "live.js", "settings.js", "taken.js", "measures.js", "grab.js",
     "transmission.js", "transmission_map.js", "transmission_panel.js", "start.js",
 )  # fmt: skip
 """Scripts, in order: each uses those before it, and the emitted module."""

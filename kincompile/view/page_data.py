@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import SAME
+from kincompile.errors import ModelError
 from kincompile.ir.interpret import interpret
 from kincompile.ir.lower import lower
 from kincompile.names import ROLES, TRIPLE
@@ -77,6 +78,7 @@ def page_data(
         "doubt": "" if solution is None else solution.doubt,
         "reasons": [] if solution is None else list(solution.reasons),
         "lengthUnit": system.length_unit,
+        "toml": _toml(system),
         "coordinates": [{"name": item.name, "unit": item.unit} for item in system.coordinates],
         "outputs": outputs,
         "equations": list(system.equations),
@@ -95,6 +97,14 @@ def page_data(
         "extent": shapes.extent(np.vstack((q, guess)) if np.isnan(q).all() else q),
         "arrays": arrays,
     }
+
+
+def _toml(system: ConstraintSystem) -> str:
+    """Return the model as a file has it; nothing where a file cannot hold it."""
+    try:
+        return system.to_toml()
+    except ModelError:
+        return ""
 
 
 def _still(name: str, shapes: Drawing, q: Array) -> str:

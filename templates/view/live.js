@@ -205,7 +205,7 @@ const live = {
     };
     button('reset', 'Reset', () => this.reset());
     button('keep', 'Keep to compare', () => settings.keep());
-    button('link', 'Copy link', copy(() => `${location.href.split('#')[0]}${this.fragment()}`, 'Copy link'));
+    button('link', 'Copy link', copy(() => taken.address(), 'Copy link'));
     button('set', 'Copy as --set', copy(() => this.options(), 'Copy as --set'));
     return bar;
   },
@@ -307,11 +307,13 @@ const live = {
 
   /* Take the values of the page's address; unknown names and wrong numbers are left out. */
   readFragment() {
-    const given = [...new URLSearchParams(location.hash.slice(1))]
-      .map(([name, text]) => [name, text.trim() === '' ? NaN : Number(text)])
+    const all = new URLSearchParams(location.hash.slice(1));
+    const given = [...all].map(([name, text]) => [name, text.trim() === '' ? NaN : Number(text)])
       .filter(([name, value]) => this.names.includes(name) && Number.isFinite(value));
     if (given.length) this.set(Object.fromEntries(given));
     else this.showValues();
+    // A page that opens is shown first; values are solved for before the next frame.
+    setTimeout(() => requestAnimationFrame(() => taken.show(all)));
   },
 
   options() {

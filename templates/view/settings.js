@@ -13,6 +13,7 @@ const REST_OF_PULL = 250;  // milliseconds without a pull, after which a family 
 const settings = {
   kept: [],
   family: [],
+  choose: (k, count) => {},  // a parameter for the family, by its number
   over: null,  // the parameter of the family: { k, count }
 
   get curves() {
@@ -70,16 +71,24 @@ const settings = {
   },
 
   /* A name by the parameters with other values than those of the page. */
-  nameNow() {
-    const changed = player.data.parameters.filter((_, k) => live.values[k] !== live.given[k]);
-    const said = changed.map(({ name, value, unit }) => this.titleOf(name, value, unit)).join(', ') || 'as made';
+  nameOf(values) {
+    const all = player.data.parameters.map((parameter, k) => ({ ...parameter, value: values[k] }));
+    const said = all.filter(({ value }, k) => value !== live.given[k]).map(({ name, value, unit }) => this.titleOf(name, value, unit)).join(', ') || 'as made';
     const same = this.kept.filter(({ name }) => name === said || name.startsWith(`${said} (`)).length;
     return same ? `${said} (${same + 1})` : said;
   },
 
   keep() {
     if (this.kept.length === MOST_KEPT) this.kept.shift();
-    this.kept.push(this.now(this.nameNow()));
+    this.kept.push(this.now(this.nameOf(live.values)));
+    this.changed();
+  },
+
+  /* Keep a setting that is not shown. */
+  keepOf(values) {
+    const setting = this.solved(values, this.nameOf(values)), drawing = structuredClone(player.data.drawing);
+    setNumbers(drawing, values);
+    this.kept.push({ ...setting, drawing });
     this.changed();
   },
 
@@ -138,6 +147,10 @@ const settings = {
       this.over = choice.value === '' ? null : { k: Number(choice.value), count: wanted };
       this.solveFamily();
       this.changed();
+    };
+    this.choose = (k, wanted) => {
+      [choice.value, count.value] = [String(k), String(wanted)];
+      take();
     };
     for (const element of [choice, count]) element.addEventListener('change', take);
     count.hidden = true;

@@ -74,7 +74,8 @@ class Stage {
   draw(state) {
     this.view = new View(this.extent(), this.width, this.height, NEAR, this.camera);
     const { ctx, view, palette } = this;
-    ctx.clearRect(0, 0, this.width, this.height);
+    ctx.fillStyle = palette.paper;  // a film has no other ground
+    ctx.fillRect(0, 0, this.width, this.height);
     ctx.save();  // what a drawing sets is not left to the next one
     for (const underlay of this.underlays) underlay(ctx, view, palette, state);
     const violated = state.isFound ? null : violatedJoints();

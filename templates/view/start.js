@@ -244,6 +244,7 @@ function start() {
     if (isSpatial) orbit.build();
     traceLongest();
   }
+  taken.build();
   newtonPanel(byId('panel-newton'));
   stage.underlays.push((ctx, view, palette) => settings.draw(ctx, view, palette));
   player.onChange(showState);

@@ -311,9 +311,9 @@ def test_that_what_is_shown_is_saved(open_page: Any, tmp_path: Path) -> None:
     page.evaluate("plots.zoom([1, 2])")
     files = {}
     for kind in ("CSV", "SVG", "PNG"):
-        page.locator(".menu summary").first.click()
+        page.locator(".plot .menu summary").first.click()
         with page.expect_download() as download:
-            page.locator(".menu").first.get_by_role("button", name=kind).click()
+            page.locator(".plot .menu").first.get_by_role("button", name=kind).click()
         files[kind] = tmp_path / download.value.suggested_filename
         download.value.save_as(files[kind])
     assert {path.name for path in files.values()} == {
