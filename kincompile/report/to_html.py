@@ -33,14 +33,15 @@ def as_html(
 ) -> str:
     """Return a document as an HTML page; the title stands before its name.
 
-    The kind is the class of the page's body: ``"slides"``, or none. What comes `after` the sections
-    is HTML: plots.
+    The kind is the class of the page's body: ``"slides"``, which keys turn, or none. What comes
+    `after` the sections is HTML: plots.
     """
     renderer = _HtmlRenderer(document)
     data = {
         "kind": kind,
         "style": read("report/math.css") + read("report/page.css").rstrip(),
         "title": escape(f"{title} {document.name}"),
+        "script": read("report/slides.js") if kind == "slides" else "",
         "heading": f"{escape(title)} <code>{escape(document.name)}</code>",
         "summary": escape(document.summary),
         "contents": "\n".join(renderer.contents(document.sections)),
@@ -80,7 +81,8 @@ class _HtmlRenderer(Renderer):
 
     def _display(self, block: doc.Display) -> Iterator[str]:
         anchor = f' id="{escape(block.anchor)}"' if block.anchor else ""
-        yield f'<div class="eq wide"{anchor}>{self._printer.display(block.formula)}</div>'
+        formula = self._printer.display(block.formula)
+        yield f'<div class="eq wide" tabindex="0"{anchor}>{formula}</div>'
         if block.source is not None:
             yield _source(block.source)
 
@@ -88,7 +90,7 @@ class _HtmlRenderer(Renderer):
         if table.folded:
             yield f"<details><summary>{escape(table.folded)}</summary>"
         header = "".join(f"<th>{self.runs(cell)}</th>" for cell in table.header)
-        yield '<div class="wide"><table>'
+        yield '<div class="wide" tabindex="0"><table>'
         yield f"<thead><tr>{header}</tr></thead><tbody>"
         for row in table.rows:
             yield f"<tr>{''.join(f'<td>{self.runs(cell)}</td>' for cell in row)}</tr>"
@@ -97,7 +99,7 @@ class _HtmlRenderer(Renderer):
             yield "</details>"
 
     def _pattern(self, pattern: doc.Pattern) -> Iterator[str]:
-        yield from ('<div class="wide">', _pattern_svg(pattern), "</div>")
+        yield from ('<div class="wide" tabindex="0">', _pattern_svg(pattern), "</div>")
 
     def _figure(self, picture: Picture) -> Iterator[str]:
         yield f"<figure>{as_svg(picture)}</figure>"
@@ -109,7 +111,10 @@ class _HtmlRenderer(Renderer):
         return self._printer.math(formula)
 
     def _link(self, link: doc.CrossReference) -> str:
-        return f'<a href="#{escape(link.anchor)}">{self.run(link.content)}</a>'
+        content, anchor = self.run(link.content), escape(link.anchor)
+        # A formula is no name that is read out.
+        name = f' aria-label="{anchor.replace("-", " ")}"' if content.startswith("<math") else ""
+        return f'<a href="#{anchor}"{name}>{content}</a>'
 
     def _box(self, is_wide: bool) -> str:
         return f'<span class="box{" wide-box" if is_wide else ""}"></span>'
@@ -151,19 +156,21 @@ def _pattern_svg(pattern: doc.Pattern) -> str:
         for k, name in enumerate(pattern.columns)
     )
     entries = (
-        element("a", _cell(pattern, row, column, left, top), href=f"#{escape(anchor)}")
+        element(
+            "a", _cell(row, column, left, top), href=f"#{escape(anchor)}",
+            aria_label=f"{pattern.rows[row]} by {pattern.columns[column]}",
+        )
         for (row, column), anchor in pattern.entries.items()
-    )
+    )  # fmt: skip
     return element(
         "svg", "".join((*bands, *rows, *columns, *entries)), class_="pattern",
         viewBox=f"0 0 {width:.0f} {height:.0f}", width=f"{width:.0f}", height=f"{height:.0f}",
-        role="img", aria_label="Pattern of the Jacobian",
+        role="group", aria_label="Pattern of the Jacobian",
     )  # fmt: skip
 
 
-def _cell(pattern: doc.Pattern, row: int, column: int, left: float, top: float) -> str:
-    title = f"<title>{escape(pattern.rows[row])} by {escape(pattern.columns[column])}</title>"
+def _cell(row: int, column: int, left: float, top: float) -> str:
     return element(
-        "rect", title, class_="entry", x=f"{left + CELL * column + 2:.0f}",
+        "rect", class_="entry", x=f"{left + CELL * column + 2:.0f}",
         y=f"{top + CELL * row + 2:.0f}", width=CELL - 4, height=CELL - 4,
     )  # fmt: skip

@@ -23,7 +23,7 @@ function tableOf(header) {
 
 function wide(table) {
   const holder = document.createElement('div');
-  holder.className = 'wide';
+  Object.assign(holder, { className: 'wide', tabIndex: 0 });
   holder.append(table);
   return holder;
 }

@@ -23,7 +23,7 @@ def saved(page: Any, kind: str, folder: Path) -> Path:
         page.locator("#taken summary").click()
     with page.expect_download() as waiting:
         page.locator("#taken").get_by_role("button", name=kind).click()
-    path = folder / waiting.value.suggested_filename
+    path: Path = folder / waiting.value.suggested_filename
     waiting.value.save_as(path)
     return path
 
