@@ -42,8 +42,14 @@ if TYPE_CHECKING:
 CORRECTIONS = 6
 """Of Newton's method, for a trial; one that takes more is too far from the trial before."""
 
-ITERATIONS = 300
-"""Steps of a start, at most."""
+FIRST, AGAIN, ROUNDS = 120, 150, 2
+"""Steps of a start, at most; steps around the best ends, and how many times they are taken."""
+
+ITERATIONS = FIRST + ROUNDS * AGAIN
+"""Steps of a search."""
+
+BEST, NEAR = 4, (1e-3, 1e-1)
+"""Ends around which there are further starts, and how far, in parts of the bounds."""
 
 KEPT = {8: 4.0, 20: 2.0, 40: 1.0, 80: 0.25}
 """After how many steps the best are kept, in parts of the starts that are followed. Others are left
@@ -168,15 +174,36 @@ class Descent:
     def run(self, x: Array, q: Array, starts: int, is_over: Callable[[int], bool]) -> Designs:
         """Follow motions (B, nx), the best first, from positions (B, N, n) to the ends of the best.
 
-        Of those with many times there are fewer, so that memory is bounded.
+        Minima lie near each other: further starts are followed around the best ends.
         """
+        ends = self._followed(x, q, starts, range(FIRST), is_over)
+        for first in range(FIRST, ITERATIONS, AGAIN):
+            if not ends.error.size or ends.error[0] <= REACHED or is_over(first):
+                break
+            x, q = self._around(ends, max(FEWEST, starts), first)
+            steps = range(first, first + AGAIN)
+            ends = Designs.best([ends, self._followed(x, q, starts // 4, steps, is_over)])
+        return ends
+
+    def _around(self, ends: Designs, count: int, seed: int) -> tuple[Array, Array]:
+        """Return variables near the best ends, (count, nx), and the positions there."""
+        rng, which = np.random.default_rng(seed), np.arange(count) % min(BEST, len(ends.x))
+        size = np.exp(rng.uniform(*np.log(NEAR), (count, 1)))
+        u = self.variables.to_u(ends.x[which])
+        near = self.variables.within(u + size * rng.normal(size=u.shape))
+        return self.variables.to_x(near), ends.q[which]
+
+    def _followed(
+        self, x: Array, q: Array, starts: int, steps: range, is_over: Callable[[int], bool]
+    ) -> Designs:
+        """Follow motions to the ends of the best; of many times fewer, as memory is bounded."""
         few = slice(max(FEWEST, MOST_POINTS // q.shape[1]))
         batch = self.solved(x[few], q[few])
         batch = batch.some(batch.good)
         if not len(batch.x):
             return Designs.none()
         ends, walk = [], _Walk(self, self.projected(self._placed(batch)))
-        for step in range(ITERATIONS):
+        for step, number in enumerate(steps):
             count, cost = len(walk.u), walk.batch.cost
             if step in KEPT and (most := max(FEWEST, int(KEPT[step] * starts))) < count:
                 rest = np.ones(count, dtype=bool)
@@ -187,7 +214,7 @@ class Descent:
             if walk.is_done.any():
                 ends.append(walk.ends(walk.is_done))
                 walk.drop(walk.is_done)
-            if is_over(step) or not len(walk.u):
+            if is_over(number) or not len(walk.u):
                 break
             walk.step()
         ends.append(walk.ends(slice(None)))
