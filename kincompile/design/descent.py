@@ -188,7 +188,8 @@ class Descent:
     def _around(self, ends: Designs, count: int, seed: int) -> tuple[Array, Array]:
         """Return variables near the best ends, (count, nx), and the positions there."""
         rng, which = np.random.default_rng(seed), np.arange(count) % min(BEST, len(ends.x))
-        size = np.exp(rng.uniform(*np.log(NEAR), (count, 1)))
+        low, high = np.log(NEAR).tolist()
+        size = np.exp(rng.uniform(low, high, (count, 1)))
         u = self.variables.to_u(ends.x[which])
         near = self.variables.within(u + size * rng.normal(size=u.shape))
         return self.variables.to_x(near), ends.q[which]
