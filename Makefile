@@ -84,15 +84,15 @@ demo: $(DEMO_READY)
 	@echo "  demo/wrecker_boom.html           the motion on a page: open it in a browser"
 
 test: $(TEST_READY)
-	@$(PYTEST) --numprocesses=auto --dist=loadgroup
+	@$(PYTEST) --numprocesses=auto --dist=loadfile
 
 # In one run, both together make what they share once.
 test-all: $(PAGES_READY)
-	@$(PYTEST) --numprocesses=auto --dist=loadgroup -m "slow or not slow"
+	@$(PYTEST) --numprocesses=auto --dist=loadfile -m "slow or not slow"
 
 # The exhaustive rest: packaging, pages in a browser, large corpora.
 test-slow: $(PAGES_READY)
-	@$(PYTEST) --numprocesses=auto --dist=loadgroup -m slow
+	@$(PYTEST) --numprocesses=auto --dist=loadfile -m slow
 
 # An older processor: other kernels of OpenBLAS, in two threads, and NumPy and libm without AVX2 and
 # FMA. Each rounds in its own way; variables that a system does not know do nothing. NumPy names its
@@ -112,7 +112,7 @@ test-elsewhere: export OPENBLAS_CORETYPE := Haswell
 test-elsewhere: export OPENBLAS_NUM_THREADS := 2
 test-elsewhere: export GLIBC_TUNABLES := glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usable,-FMA_Usable
 test-elsewhere: $(TEST_READY)
-	@NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c '$(FEATURES)')" $(PYTEST) --numprocesses=auto --dist=loadgroup -m "not slow or printed" $(ROUNDED) $(NOT_ROUNDED)
+	@NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c '$(FEATURES)')" $(PYTEST) --numprocesses=auto --dist=loadfile -m "not slow or printed" $(ROUNDED) $(NOT_ROUNDED)
 
 # The scripts of a page share one scope, so that each kind of page is read by itself.
 PAGES := plane space gallery watch

@@ -42,12 +42,29 @@ TOGETHER = ("tests/targets/", "tests/unit/files/test_hostile.py")
 all hostile files, takes a minute and more to find out."""
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep every n-th case of `every(n)` quick, and let one process have the tests of a file.
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Return what gives tests to processes with `--dist=loadfile`, as the Makefile asks."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadScopeScheduling  # several processes are optional
 
-    These share what is made; slow ones go alone.
-    """
+    is_quick = config.option.markexpr.startswith("not slow")
+
+    class Together(LoadScopeScheduling):  # type: ignore[misc]
+        """One process has the tests of a file, which share what is made; of slow ones of a test."""
+
+        def _split_scope(self, nodeid: str) -> str:
+            path, _, _ = nodeid.partition("::")
+            place = next((place for place in TOGETHER if path.startswith(place)), path)
+            return place if is_quick or place in TOGETHER else nodeid.partition("[")[0]
+
+    return Together(config, log)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep every n-th case of `every(n)` quick; the others are slow."""
     cases = Counter[str]()
     for item in items:
         mark, function = item.get_closest_marker("every"), item.nodeid.partition("[")[0]
@@ -55,13 +72,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             if cases[function] % mark.args[0]:
                 item.add_marker(pytest.mark.slow)
             cases[function] += 1
-    if not config.getoption("loadgroup", False):  # `--dist=loadgroup`, as the Makefile asks
-        return
-    for item in items:
-        path, _, _ = item.nodeid.partition("::")
-        place = next((place for place in TOGETHER if path.startswith(place)), path)
-        if place != path or path in TOGETHER or not item.get_closest_marker("slow"):
-            item.add_marker(pytest.mark.xdist_group(place))
 
 
 def pytest_collection_finish() -> None:
