@@ -51,7 +51,8 @@ def holding(
 ) -> list[FreeEquation]:
     """Return equations that hold motions (k, n), in scales, about as they are at the start."""
     names = [item.name for item in system.coordinates]
-    solids = {body.name: body for body in system.bodies if body.kind.frame.size == SPACE}
+    spins = spins_of(system, ranks.state[0][0])
+    solids = {body.name: body for body in system.bodies if body.name in spins}
     turns = {name for body in solids.values() for name in body.coordinates[SPACE:]}
     web = Web.of(system)
     loose = loose_bodies(system)
@@ -62,9 +63,8 @@ def holding(
             rows.append(row)
             weights.append(ANGLES_FIRST if item.unit == "rad" else 1.0)
             wanted.append((name, None))
-    spins = spins_of(system, ranks.state[0][0])
     for body in solids:
-        axes = loose[body].axes if body in loose else np.eye(3)
+        axes = loose[body].directions if body in loose else np.eye(3)
         for axis in axes:
             row = axis @ spins[body] * ranks.scale
             rows.append(row / np.linalg.norm(row))

@@ -39,12 +39,12 @@ ALONG = 1e-6
 class Loose:
     """A body that may turn while the centres of its joints stay.
 
-    `centres` (c, size) are those of its joints, `axes` (k, 3) the directions about which it may
+    `centres` (c, size) are those of its joints, `directions` (k, 3) those about which it may
     turn, of length one, both in its frame; in the plane the axis is (0, 0, 1).
     """
 
     centres: Array
-    axes: Array
+    directions: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,8 +94,10 @@ def loose_bodies(system: ConstraintSystem) -> dict[str, Loose]:
     while True:
         before = left
         left = {name: _narrowed(name, before, web.joints, defaults) for name in before}
-        left = {name: item for name, item in left.items() if len(item.axes)}
-        if [len(x.axes) for x in left.values()] == [len(x.axes) for x in before.values()]:
+        left = {name: item for name, item in left.items() if len(item.directions)}
+        if [len(x.directions) for x in left.values()] == [
+            len(x.directions) for x in before.values()
+        ]:
             between = {x for some in web.groups(left) if web.hangs_between(some) for x in some}
             if between == left.keys():
                 return left
@@ -155,12 +157,15 @@ def _narrowed(
         if name not in letters or any(x != name and x in found for x in letters):
             continue
         if item.type_name in RIGID:
-            return replace(own, axes=own.axes[:0])
+            return replace(own, directions=own.directions[:0])
         if item.type_name not in HINGES or own.centres.shape[1] == 2:
             continue
         axis = np.array(_numbers(item.points[f"h_{letters[name]}"], defaults))
         axis = axis / np.linalg.norm(axis)
-        across = own.axes - np.outer(own.axes @ axis, axis)
-        may_turn = len(own.axes) == 3 or np.abs(across).max(initial=ALONG) <= ALONG
-        own = replace(own, axes=axis[np.newaxis] if may_turn and len(own.axes) else own.axes[:0])
+        across = own.directions - np.outer(own.directions @ axis, axis)
+        may_turn = len(own.directions) == 3 or np.abs(across).max(initial=ALONG) <= ALONG
+        own = replace(
+            own,
+            directions=axis[np.newaxis] if may_turn and len(own.directions) else own.directions[:0],
+        )
     return own
