@@ -62,7 +62,7 @@ MODELS: dict[str, Case] = {
     "long number": ("urdf", lambda: chain(1).replace("1 0 0", "9" * 7 * 10**6), "give 3 numbers"),
     "many numbers": ("urdf", lambda: chain(1).replace("1 0 0", "1 " * 10**6), "give 3 numbers"),
     "long names": ("urdf", lambda: chain(3).replace("l1", "l" * 10**6), ""),
-    "many links of a robot": ("urdf", lambda: chain(10000, "fixed"), "at most 3000"),
+    "many links of a robot": ("urdf", lambda: chain(4000, "fixed"), "at most 3000"),
     "many joints": ("urdf", lambda: chain(301), "301 joints that move; at most 3000 and 300"),
     "a chain that does not close": ("urdf", lambda: chain(290, loop=FAR), "cannot be closed"),
     "a chain": ("urdf", lambda: chain(290), ""),
