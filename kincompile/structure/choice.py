@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import HALF
+from kincompile.criteria import HALF, NOISE
 from kincompile.structure.rank import DEPENDENT, damped
 
 if TYPE_CHECKING:
@@ -27,9 +27,6 @@ TIMES, ITERATIONS = 32, 8
 
 NEAR_ENOUGH = math.sqrt(HALF)
 """Last step to a position, in scales: what it leaves is the square of it."""
-
-NO_DAMPING = 1e-12
-"""What takes the place of a damping where what no equation determines is to stay."""
 
 BETTER = 4.0
 """How many times farther from dependent another choice must keep the equations to be taken."""
@@ -91,7 +88,8 @@ def along_motion(
             if not np.isfinite(lengths).all() or not lengths.all():
                 return found
             matrix = matrix / lengths[:, np.newaxis]
-            step = damped(matrix, Phi / lengths, NO_DAMPING)
+            # so little that only what no equation determines stays
+            step = damped(matrix, Phi / lengths, NOISE)
             at = at - ranks.scale * step
             if np.max(np.abs(step)) <= NEAR_ENOUGH:
                 break

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kincompile.criteria import SLIGHT
 from kincompile.model.arguments import Kind
 from kincompile.model.expressions import as_sympy, evaluate
 from kincompile.model.resolve import Joint
@@ -31,8 +32,6 @@ RIGID = ("Fixed", "Translational")
 """Joints whose bodies turn together. Their points are no centres."""
 HINGES = ("Revolute", "Cylindrical", "Screw", "Planar", "Parallel")
 """Joints whose bodies turn about one axis relative to each other."""
-ALONG = 1e-6
-"""Sine of the angle between directions that are one line, and part of a body that is a point."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,7 +139,7 @@ def spread(points: Array, size: float) -> int:
 
     A small part of the size of the mechanism is a rounding error.
     """
-    return int(np.linalg.matrix_rank(points - points[:1], ALONG * size)) if len(points) else 0
+    return int(np.linalg.matrix_rank(points - points[:1], SLIGHT * size)) if len(points) else 0
 
 
 def _numbers(given: Sequence[Scalar], defaults: Mapping[str, float]) -> list[float]:
@@ -163,7 +162,7 @@ def _narrowed(
         axis = np.array(_numbers(item.points[f"h_{letters[name]}"], defaults))
         axis = axis / np.linalg.norm(axis)
         across = own.directions - np.outer(own.directions @ axis, axis)
-        may_turn = len(own.directions) == 3 or np.abs(across).max(initial=ALONG) <= ALONG
+        may_turn = len(own.directions) == 3 or np.abs(across).max(initial=SLIGHT) <= SLIGHT
         own = replace(
             own,
             directions=axis[np.newaxis] if may_turn and len(own.directions) else own.directions[:0],

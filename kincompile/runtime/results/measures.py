@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.criteria import ROOT_LENGTH, SAME, SOLVED, STILL, ZERO
+from kincompile.criteria import ROOT_LENGTH, SAME, SOLVED, STEEP, STILL, ZERO
 from kincompile.errors import InputError
 from kincompile.html import Shown
 from kincompile.names import column_name, listed, suggestion
@@ -38,9 +38,6 @@ if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array, Compiled
     from kincompile.runtime.results.columns import MotionTable
     from kincompile.runtime.results.observed import Between
-
-POLE = 1e6
-"""How many times an output is larger at a pole than at the points of the grid beside it."""
 
 GAUSS_PLACES = 8
 """Places for the integral over a step at whose ends a rate does not exist."""
@@ -216,7 +213,7 @@ def _poles(motion: ObservedMotion, k: int) -> Between[tuple[list[float], list[fl
             while True:
                 value, rate, _ = yield from motion.at(time, k)
                 time = search.send((1 / value, -rate / value**2) if value else (math.nan, math.nan))
-        if abs(value) > POLE * max(abs(y[a]), abs(y[a + 1])):
+        if abs(value) > STEEP * max(abs(y[a]), abs(y[a + 1])):
             found[0].append(time)
             found[1].append(time)
     return found
