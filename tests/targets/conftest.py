@@ -65,7 +65,7 @@ class Case:
 
     @classmethod
     def of(cls, model: Any, q: Any, t: Any = None, spread: float = 1.0) -> "Case":
-        """Return a case with seeded rates, times and parameters, these by a part of their spread."""
+        """Return a case with seeded rates, times and parameters, which spread by so much."""
         rng = np.random.default_rng(20240717)
         rows = np.asarray(q, dtype=float)
         t = rng.uniform(0.1, 0.9, len(rows)) if t is None else t
