@@ -87,7 +87,9 @@ def loose_bodies(system: ConstraintSystem) -> dict[str, Loose]:
     web = Web.of(system)
     defaults = {x.name: float(x.default or 0.0) for x in system.parameters}
     joined = [body for body in system.bodies if len(web.others[body.name]) > 1]
-    centres = {body.name: _centres(body, web.joints, defaults) for body in joined}
+    # Angles alone hold no body in place: what is missing there is a joint.
+    found = {body.name: _centres(body, web.joints, defaults) for body in joined}
+    centres = {name: own for name, own in found.items() if len(own)}
     size = max((np.abs(x).max(initial=0.0) for x in centres.values()), default=0.0)
     left = {name: _loose(own, size) for name, own in centres.items()}
     while True:

@@ -140,7 +140,7 @@ def test_that_schema_and_reader_take_the_same(schema, name, data):
 PARTS: dict[str, type] = {
     f"{prefix}{name}": cls
     for prefix, count in (("", PLANE), ("spatial_", SPACE))
-    for name, cls in {**dimensions(count).tables(), **dimensions(count).parts()}.items()
+    for name, cls in {**dimensions(count).parts(), **dimensions(count).tables()}.items()
     if name != "sketch"  # read by its parts, in their order
 }
 WRITTEN = PARTS | {name: DECLARED[name] for name in DECLARED if name not in ("sketch", *COMMANDS)}
@@ -246,7 +246,7 @@ def of_parts(sketch, count):
     """Return the methods of a drawing with what they draw; without `on` it is the ground."""
     others = {"on": None, "length": None} if count == PLANE else {"on": None}
     return [
-        (getattr(sketch, kind), cls, {kind: None, **others})
+        (getattr(sketch, kind), cls, {kind: "joint" if kind == "point" else None, **others})
         for kind, cls in dimensions(count).parts().items()
     ]
 
@@ -265,7 +265,7 @@ FUNCTIONS = [
     (kc.Mechanism.point, DECLARED["point"], {}),
     (kc.Mechanism.output, DECLARED["output"], {}),
     (spatial.Mechanism.body, PARTS["spatial_body"], {}),
-    (spatial.Mechanism.point, PARTS["spatial_point"], {}),
+    (spatial.Mechanism.point, dimensions(SPACE).tables()["point"], {}),
     (kc.motion.sequence, sections.MotionSteps, {"ramp": None}),  # a quarter, exactly
     (kc.motion.table, sections.MotionRows, {"over": None}),
     *of_parts(kc.Sketch, PLANE),

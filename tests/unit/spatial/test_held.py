@@ -316,3 +316,17 @@ def test_that_forces_say_where_they_depend_on_how_a_freedom_is_held():
 def test_that_masses_move_what_drivers_leave_free():
     assert held_system(heavy((0.16, 0.01, 0)).system()).held == ("spin of rod",)
     assert held_system(heavy((0.16, 0.01, 0), motor=False).system()).held == ()
+
+
+def test_that_a_body_which_angles_alone_hold_lacks_a_joint():
+    m = kc.Mechanism("forgotten_joint")
+    crank, block, rod = (m.body(name, guess=(1, k, 0)) for k, name in enumerate(("a", "b", "c")))
+    m.add(kc.Revolute("O", m.ground, (0, 0), crank, (0, 0)))
+    m.add(kc.AbsoluteAngle("motor", crank, kc.t))
+    m.add(kc.Revolute("A", crank, (1, 0), rod, (0, 0)))
+    m.add(kc.Revolute("B", m.ground, (1, 0), rod, (0, 0)))
+    m.add(kc.RelativeAngle("left", crank, block, 0.5))
+    m.add(kc.RelativeAngle("right", rod, block, 0.5))
+    found = kc.inspect(m)
+    assert found.held == ()
+    assert set(found.free) == {"b"}
