@@ -90,7 +90,8 @@ def test_that_variants_of_a_ready_exercise_assemble_and_differ(name: str) -> Non
         texts.add(variant.to_toml())
     assert len(texts) == 2
     quantities = {item.quantity for item in made.blanks[0]}
-    assert quantities == {"Phi_q", "gamma"}
+    # The follower never turns, and gamma of the contact is too long to be asked for.
+    assert quantities == ({"Phi_q"} if name == "cam_flat_follower.toml" else {"Phi_q", "gamma"})
     system = made.variants[0].system()
     for item in made.blanks[0]:  # what is asked for varies, and is no riddle
         answer = item.answer(system.Phi_q, system.gamma)
