@@ -101,7 +101,8 @@ def picture_in_plane(
         for polyline in of_mark(mark, drawn.size)
         for path in _paths(polyline, q, scale, opacity_of(mark, shown))
     ]
-    return composed(title, scale, paths, zip(arrows, ends, strict=True))
+    pins = [scale.at(joint.place.at(q)) for joint in drawn.joints if joint.place is not None]
+    return composed(title, scale, paths, zip(arrows, ends, strict=True), pins)
 
 
 def composed(
@@ -109,15 +110,19 @@ def composed(
     scale: Scale,
     paths: Iterable[PicturePath],
     arrows: Iterable[tuple[Arrow, Array]] = (),
+    pins: Iterable[Array] = (),
 ) -> Picture:
-    """Return a picture of paths, and over them vectors with their ends before they are scaled."""
-    shown, labels = list(paths), list[PictureLabel]()
+    """Return a picture of paths, and over them vectors with their ends before they are scaled.
+
+    Labels keep away from pins, which are points of the picture.
+    """
+    shown, labels, taken = list(paths), list[PictureLabel](), list(pins)
     for arrow, ends in arrows:
         start, end = scale.at(ends)
         shown += _arrow(arrow, start, end)
-        x, y = _free(_places(arrow, start, end), labels)
-        colour = colour_of(arrow.frame)
-        labels.append(PictureLabel(x, y, arrow.name, colour, arrow.is_vector))
+        taken.append(_free(_places(arrow, start, end), taken))
+        x, y = taken[-1].tolist()
+        labels.append(PictureLabel(x, y, arrow.name, colour_of(arrow.frame), arrow.is_vector))
     return Picture(title, scale.width, scale.height, tuple(shown), tuple(labels))
 
 
@@ -190,16 +195,14 @@ def _places(arrow: Arrow, start: Array, end: Array) -> list[Array]:
     _, along = _way(start, end)
     aside = ASIDE * np.array((-along[1], along[0]))
     if not arrow.is_vector or (arrow.is_direction and len(arrow.start) > PLANE):
-        return [end + ASIDE * along, end + aside, end - aside]
+        return [end + ASIDE * along, end + aside, end - aside, end + 2 * aside, end - 2 * aside]
     return [start + part * (end - start) + side for part in ALONG for side in (aside, -aside)]
 
 
-def _free(places: list[Array], labels: list[PictureLabel]) -> tuple[float, float]:
-    """Return the first place that is far enough from all labels, or the farthest."""
+def _free(places: list[Array], taken: list[Array]) -> Array:
+    """Return the first place that is far enough from those that are taken, or the farthest."""
 
     def distance(place: Array) -> float:
-        near = (float(np.hypot(place[0] - item.x, place[1] - item.y)) for item in labels)
-        return min(min(near, default=ROOM), ROOM)
+        return min([ROOM, *(float(np.hypot(*(place - item))) for item in taken)])
 
-    x, y = max(places, key=distance)
-    return float(x), float(y)
+    return max(places, key=distance)

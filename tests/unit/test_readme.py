@@ -222,6 +222,15 @@ def test_that_the_readme_is_short():
     assert len(README.splitlines()) <= 180
 
 
+def test_that_an_extra_is_installed_without_a_copy_of_the_package():
+    """`pip install '.[x]'` replaces an editable install by a copy; edits have no effect then."""
+    pages = [*PAGES, ROOT / "examples" / "notebooks" / "README.md"]
+    lines = [line for page in pages for line in page.read_text(encoding="utf-8").splitlines()]
+    installs = [line for line in lines if re.search(r"pip install .*\.\[", line)]
+    assert len(installs) > 5
+    assert [line for line in installs if re.search(r"pip install '?\.\[", line)] == []
+
+
 def test_that_the_make_targets_exist():
     targets = re.findall(r"^make (\S+)", README, flags=re.MULTILINE)
     assert targets == ["demo", "test"]

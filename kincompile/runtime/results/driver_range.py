@@ -18,7 +18,7 @@ from kincompile.runtime.problem import problem
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.singular.events import BIFURCATION, LOCK_UP, involved
 from kincompile.runtime.singular.reach import Measure, freed_curve
-from kincompile.tables import table
+from kincompile.tables import table, without_noise
 
 if TYPE_CHECKING:
     from kincompile.runtime.engine.code import Array, Compiled
@@ -108,14 +108,14 @@ def limit(equations: Problem, form: Measure, row: int, q: Array, t: float, sign:
     assert point is not None  # it was solved
     curve, state = freed_curve(equations, row, point, t)
     start = curve.start(state, sign)
-    end = form.residual(form.value(0.0) + sign * reach)
-    bracket = start and curve.next_singular(start, end)
+    bracket = start and curve.next_singular(start, form.residual(form.value(0.0) + sign * reach))
     found = bracket and curve.singular_point(bracket)
     if not (bracket and found):
         return Limit(sign * math.inf, "", (), np.empty(0))
     place = found[0]
     kind = LOCK_UP if bracket.turns else BIFURCATION
-    return Limit(form.value(place.t), kind, involved(equations.code, place.tangent[:-1]), place.q)
+    value = float(without_noise(form.value(place.t), reach))
+    return Limit(value, kind, involved(equations.code, place.tangent[:-1]), place.q)
 
 
 def driver_table(drivers: tuple[DriverRange, ...], angle_unit: str) -> list[str]:

@@ -112,6 +112,27 @@ def test_that_nothing_of_a_picture_is_outside_it(name: str, example_named: Any) 
         assert -1 < y.min() <= y.max() < shown.height + 1
 
 
+def centre_of_ring(path: Any) -> Any:
+    """Return the centre of a path that is a small circle, as the eye of a pin is; else None."""
+    points = np.asarray(path.points)
+    centre = points[:-1].mean(axis=0)
+    radii = np.hypot(*(points - centre).T)
+    is_ring = len(points) > 8 and np.ptp(radii) < 0.1 * radii.max() and radii.max() < 6
+    return centre if is_ring else None
+
+
+@pytest.mark.parametrize("name", ["four_bar", "inverted_slider_crank", "wrecker_boom"])
+def test_that_no_label_of_an_axis_lies_on_a_pin(name: str, example_named: Any) -> None:
+    shown = Figures(evaluation(example_named(name).model.system(), 0.0)).mechanism()
+    assert shown is not None
+    centres = (centre_of_ring(path) for path in shown.paths)
+    pins = np.array([centre for centre in centres if centre is not None])
+    assert len(pins) > 2
+    places = np.array([(label.x, label.y) for label in shown.labels])
+    distances = np.hypot(*(places[:, None] - pins).T)
+    assert distances.min() >= 17
+
+
 @pytest.fixture(scope="module")
 def in_space() -> Figures:
     """Return the figures of one constraint of each type in space, at the golden state."""

@@ -209,6 +209,20 @@ def test_how_far_a_cylinder_can_go():
     assert reach.unit == "m"
 
 
+def test_that_a_limit_at_zero_is_zero():
+    """Two bars of 500 mm fold up: the slider is at the pivot, where it can go two ways."""
+    s = kc.Sketch("folded", length_unit="mm", end=1.0, points=11)
+    s.ground(A=(0, 0))
+    s.joints(B=(800, 0), M=(400, 300))
+    s.link("bar", "A M", 500)
+    s.link("rod", "M B", 500)
+    s.slider("roller", "B", along=(1, 0))
+    s.drive("B.x", 950 - 450 * kc.t)
+    reach = kc.solve(kc.compile(s.mechanism()), np.linspace(0, 1, 11)).measures()["drive_B_x"]
+    assert (reach.low.kind, reach.low.value) == ("bifurcation", 0.0)
+    assert reach.high.value == pytest.approx(1000, rel=1e-9)
+
+
 def test_that_a_crank_that_goes_round_meets_no_limit(found):
     reach = found["motor"]
     assert (reach.low.value, reach.high.value) == (-math.inf, math.inf)
