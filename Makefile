@@ -21,6 +21,7 @@ test test-all test-slow goldens: export OPENBLAS_NUM_THREADS := 1
 VENV_READY := $(VENV)/venv.stamp
 DEMO_READY := $(VENV)/demo.stamp
 TEST_READY := $(VENV)/test.stamp
+NODE_READY := $(VENV)/node.stamp
 PAGES_READY := $(VENV)/pages.stamp
 LINT_READY := $(VENV)/lint.stamp
 DOCS_READY := $(VENV)/docs.stamp
@@ -61,15 +62,20 @@ $(TEST_READY): $(DEMO_READY)
 	@$(PIP) --editable '.[test,plot,sweep,dxf,watch,stiff,jax,robots]'
 	@touch $@
 
-$(PAGES_READY): $(TEST_READY)
+# What checks the pages, their scripts and what a browser makes of them, is of npm.
+$(NODE_READY): $(TEST_READY) .ci/page/package-lock.json
+	@echo "Installing tsc, eslint and axe-core into .ci/page"
+	@PATH="$(CURDIR)/$(BIN):$$PATH" npm ci --prefix .ci/page --silent
+	@touch $@
+
+$(PAGES_READY): $(NODE_READY)
 	@echo "Installing what reads notebooks, drives a browser and grades courses into $(VENV)"
 	@$(PIP) --editable '.[pages,courses]'
 	@touch $@
 
-$(LINT_READY): $(TEST_READY) .ci/page/package-lock.json
-	@echo "Installing ruff and mypy into $(VENV), tsc and eslint into .ci/page"
+$(LINT_READY): $(NODE_READY)
+	@echo "Installing ruff and mypy into $(VENV)"
 	@$(PIP) --editable '.[lint]'
-	@PATH="$(CURDIR)/$(BIN):$$PATH" npm ci --prefix .ci/page --silent
 	@touch $@
 
 demo: $(DEMO_READY)

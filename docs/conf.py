@@ -38,6 +38,7 @@ add_module_names = False
 
 html_theme = "pydata_sphinx_theme"
 html_title = "kincompile"
+templates_path = ["templates"]
 html_static_path = ["static", "../templates/report/math.css"]  # the font of formulas
 html_css_files = ["math.css", "site.css"]
 html_extra_path = ["made/extra"]

@@ -116,7 +116,7 @@ def _prose(_: Any, tokens: Sequence[Token], index: int, *given: object) -> str:
 
 
 def _formula(match: re.Match[str]) -> str:
-    return f'<div class="math">{as_mathml(match[1], "block")}</div>'
+    return f'<div class="math" tabindex="0">{as_mathml(match[1], "block")}</div>'
 
 
 def _filled(title: str, body: str) -> str:

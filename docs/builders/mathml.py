@@ -26,5 +26,5 @@ def _inline(self: HTML5Translator, node: Element) -> None:
 
 
 def _display(self: HTML5Translator, node: Element) -> None:
-    self.body.append(f'<div class="math">{as_mathml(node.astext(), "block")}</div>')
+    self.body.append(f'<div class="math" tabindex="0">{as_mathml(node.astext(), "block")}</div>')
     raise SkipNode
