@@ -1,5 +1,5 @@
-// Calls of a unit for co-simulation, right and wrong ones: TOKEN, and the number of value
-// references. Returns 0, or the line of the first call that gave something else than it should.
+// Calls of a unit for co-simulation, right and wrong ones: TOKEN, the number of value references,
+// and y where it has derivatives. Returns 0, or the line of the first call that gave something else than it should.
 
 #include "fmi3Functions.h"
 
@@ -30,7 +30,7 @@ static fmi3Status step(fmi3Instance unit, double t, double h)
     return fmi3DoStep(unit, t, h, fmi3False, &has_event, &terminates, &is_early, &last);
 }
 
-static int run(fmi3Instance unit, fmi3ValueReference all, int turn)
+static int run(fmi3Instance unit, fmi3ValueReference all, int turn, bool has_derivatives)
 {
     const fmi3ValueReference one = 1, beyond = 100 * all;
     const double bad[] = { NAN, NAN };
@@ -61,6 +61,8 @@ static int run(fmi3Instance unit, fmi3ValueReference all, int turn)
     NEED(step(unit, 0, 0.3));
     FAIL(fmi3DeserializeFMUState(unit, bytes, size - 1, &again));
     NEED(fmi3Reset(unit));
+    FAIL(fmi3DeserializeFMUState(unit, NULL, size, &again));
+    NEED(fmi3Reset(unit));
     FAIL(fmi3SerializeFMUState(unit, kept, bytes, size - 1));
     FAIL(fmi3GetInt32(unit, &one, 1, &number, 1));
     FAIL(fmi3GetClock(unit, &one, 1, &is_ticking));
@@ -70,6 +72,13 @@ static int run(fmi3Instance unit, fmi3ValueReference all, int turn)
     NEED(fmi3FreeFMUState(unit, &kept));
     NEED(fmi3FreeFMUState(unit, &again));
     NEED(fmi3FreeFMUState(unit, NULL)); // is ignored, as FMI 3.0 says
+    if (has_derivatives) {
+        NEED(fmi3EnterInitializationMode(unit, false, 0, 0, false, 0));
+        NEED(fmi3GetDirectionalDerivative(unit, NULL, 0, NULL, 0, NULL, 0, NULL, 0));
+        NEED(fmi3GetAdjointDerivative(unit, NULL, 0, &one, 1, NULL, 0, &x, 1));
+        FAIL(fmi3GetAdjointDerivative(unit, NULL, 1, NULL, 1, NULL, 1, NULL, 1));
+    } else
+        FAIL(fmi3GetAdjointDerivative(unit, NULL, 0, NULL, 0, NULL, 0, NULL, 0));
     NEED(fmi3Reset(unit));
     free(bytes);
     return 0;
@@ -91,7 +100,8 @@ int main(int count, char **given)
     if (!unit || !other)
         return __LINE__;
     for (int turn = 0; turn < 3; turn++) {
-        const int line = run(turn % 2 ? other : unit, (fmi3ValueReference)atoi(given[2]), turn);
+        const int line = run(
+            turn % 2 ? other : unit, (fmi3ValueReference)atoi(given[2]), turn, *given[3] == 'y');
         if (line)
             return line;
     }
@@ -99,5 +109,5 @@ int main(int count, char **given)
     fmi3FreeInstance(other);
     fmi3FreeInstance(NULL);
     FAIL(fmi3Reset(NULL));
-    return said == 1 + 3 * 8 ? 0 : __LINE__;
+    return said == 1 + 3 * 10 ? 0 : __LINE__;
 }

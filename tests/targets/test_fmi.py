@@ -363,7 +363,7 @@ def test_calls_from_c_under_sanitizers(sources, place, quick_compiler, tmp_path)
     given = [CALLS, *folder.glob("*.c"), "-I", HEADERS.parent, "-o", tmp_path / "calls", "-lm"]
     subprocess.run([quick_compiler, *how, *given], check=True)
     last = max(x.valueReference for x in about.modelVariables)
-    command = [tmp_path / "calls", about.guid, str(last + 1)]
+    command = [tmp_path / "calls", about.guid, str(last + 1), "ny"[place]]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 

@@ -56,6 +56,19 @@ def test_a_lock_up_is_an_error_with_name_and_time(units):
     assert said.endswith("shorten the range of the drivers, or change lengths.")
 
 
+def test_a_step_of_too_many_turns_is_no_jump(units):
+    with instance_of(units["slider"]) as unit:
+        unit.begin()
+        with pytest.raises(FMICallException):
+            unit.step(0.0, 1e5)
+        (said,) = unit.said
+        assert said.startswith("slider_crank cannot go from t = 0 s to 100000 s in one step: it is")
+        assert said.endswith(". Take shorter steps.")
+        t, phi = unit.get("t", "crank.phi")
+        assert t > 100
+        assert phi == pytest.approx(2 * math.pi * t)  # it stands where it was followed to
+
+
 def test_two_instances_do_not_disturb_each_other(units):
     with instance_of(units["slider"]) as one, instance_of(units["slider"]) as other:
         other.put(r=0.05)

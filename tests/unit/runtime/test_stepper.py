@@ -315,7 +315,9 @@ def test_that_parameters_change_on_the_way(target):
         compare(now, expected)
         q = now.q
     compare(step(t, a=2.05), kc.solve(module, t, {"a": 2.05, "d": 2.9}, q))
-    np.testing.assert_array_equal(step(t).p, [2, 2, 2, 2.9])  # its own again
+    own = step(t)
+    np.testing.assert_array_equal(own.p, [2, 2, 2, 2.9])  # its own again
+    compare(own, kc.solve(module, t, {"d": 2.9}, q))
     np.testing.assert_array_equal(step(t, {"c": 2.1}).p, [2, 2, 2.1, 2.9])
 
 
@@ -408,6 +410,18 @@ def test_that_numbers_of_a_step_in_c_begin_with_a_line_of_the_cache():
         found = _zeros(count)
         assert (found.size, found.ctypes.data % 64) == (count, 0)
         assert not found.any()
+
+
+def test_that_a_step_in_c_begins_at_any_array_and_where_there_is_a_position():
+    code = code_of(kc.compile(rocked(), "c"))
+    q, p = kc.solve(code.module, 0.3).q[0], code.module.DEFAULTS
+    make = code.stepper
+    assert make is not None
+    states, status = make(np.repeat(q, 2)[::2], 0.3, p, 3.0)(0.3, p)
+    assert status == 0
+    np.testing.assert_allclose(states[0], q, atol=1e-12)
+    begun_nowhere = make(q, 0.3, p * [0.1, 0.1, 1, 1], 3.0)
+    assert begun_nowhere(0.3, p)[1] != 0
 
 
 @pytest.mark.parametrize("target", TARGETS)
