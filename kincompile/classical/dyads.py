@@ -186,9 +186,8 @@ def _check_given(count: int, given: set[str]) -> None:
         words = " or ".join(listed(sorted(item)).replace(",", " and") for item in allowed if item)
         remedy = f"Give {words}" if words else "Leave that out"
         optional = ", or nothing" if count == 4 else ""
-        raise InputError(
-            f"{count} poses do not go with: {listed(sorted(given))}. {remedy}{optional}."
-        )
+        wrong = f"do not go with: {listed(sorted(given))}" if given else "leave a choice open"
+        raise InputError(f"{count} poses {wrong}. {remedy}{optional}.")
 
 
 def _places(given: Any, what: str) -> Complex:

@@ -300,10 +300,11 @@ class Descent:
             after = self.seen(found.some(found.good), names).rows()[1]
             assert after is not None
             own = before[found.good]
-            same = np.abs(after - own) <= LINEAR * np.nanmax(
-                np.abs(own), axis=(1, 2), keepdims=True
-            )
-            keeps[:, k] = same.all(axis=(0, 1))[: len(names)]
+            # A motion without derivatives says nothing of what is linear.
+            has_both = np.isfinite(after + own).all(axis=(1, 2))
+            after, own = after[has_both], own[has_both]
+            same = np.abs(after - own) <= LINEAR * np.abs(own).max(axis=(1, 2), keepdims=True)
+            keeps[:, k] = same.all(axis=(0, 1))[: len(names)] & has_both.any()
         chosen: list[int] = []
         for k in np.flatnonzero(keeps.diagonal()).tolist():
             is_free = not np.nan_to_num(limits[..., k]).any() and before[..., k].any()

@@ -104,8 +104,11 @@ def _side_by_side(found: Fit, first: Solution) -> str:
 
 
 def _over_time(found: Fit, motion: Solution) -> Iterator[str]:
-    """Yield a plot of each column with targets: what was found, and what was wanted."""
-    for name in dict.fromkeys(item.column for item in found.reached):
+    """Yield a plot of each column with targets: what was found, and what was wanted.
+
+    What is asked of a whole motion, as a dwell or a time ratio, has no values over time.
+    """
+    for name in dict.fromkeys(x.column for x in found.reached if x.column in motion.units):
         items = [item for item in found.reached if item.column == name]
         # Of angles the turn that was found.
         wanted = np.array([(item.t, item.got - item.off) for item in items]).T

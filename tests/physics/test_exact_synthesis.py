@@ -165,7 +165,7 @@ FIVE = poses_at(AROUND).tolist()
         (lambda s: s.dyads([(k, k * k, 0) for k in range(5)]), "follow from the others, as for tr"),
         (lambda s: s.dyads(FIVE, turn=1), "5 poses do not go with: turn. Leave that out."),
         (lambda s: s.dyads(FIVE[:4], circle=(0, 0)), "with: circle. Give turn, or nothing."),
-        (lambda s: s.dyads(FIVE[:3]), "3 poses do not go with: none. Give circle or centre."),
+        (lambda s: s.dyads(FIVE[:3]), "3 poses leave a choice open. Give circle or centre."),
         (lambda s: s.dyads(FIVE[:2], circle=(0, 0)), "Give circle and turn or centre and turn"),
         (lambda s: s.dyads(FIVE[:3], circle=(0, 0, 0)), r"circle has the shape \(1, 3\)"),
         (lambda s: s.dyads(FIVE[:4], turn=[1, math.tau]), "A turn of the link is zero"),

@@ -137,7 +137,7 @@ def test_files_with_tables_keep_to_the_schema(file):
         jsonschema.validate(data, kc.model_schema())
 
 
-def test_every_kind_of_target_can_be_written(kincompile, file):
+def test_every_kind_of_target_can_be_written(kincompile, file, tmp_path):
     table = """
 [fit]
 parameters = { r = [0.05, 0.2] }
@@ -154,8 +154,10 @@ targets = [
     { dwell = "crank.phi", between = [0, 0.1], within = 9, at = "30*deg" },
 ]
 """
-    done = kincompile("fit", file(table))
+    page = tmp_path / "page.html"
+    done = kincompile("fit", file(table), "--page", page)
     assert done.exit_code == 0, done.stderr
+    assert "over time, and what was wanted" in page.read_text(encoding="utf-8")
     for word in (
         "x_ram",
         "phi_crank",

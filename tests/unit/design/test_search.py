@@ -106,6 +106,14 @@ def test_which_parameters_are_linear():
     assert {names[k] for k in descent.linear_of(batch.some(slice(16)))} == {"u", "v", "x0", "y0"}
 
 
+def test_that_a_motion_without_derivatives_hides_no_linear_parameter():
+    """Lengths may be almost zero: one of the motions has derivatives that are no numbers."""
+    descent, batch = some(four_bar(), [timed(CLOSED)], box((1e-4, 50), (-50, 50)))
+    names = descent.bench.names
+    assert not np.isfinite(descent.seen(batch, names).rows()[1]).all()
+    assert {names[k] for k in descent.linear_of(batch)} == {"u", "v", "x0", "y0"}
+
+
 def test_that_what_a_limit_depends_on_is_not_taken_as_linear():
     limit = kc.targets.limit("P.y", most=2.0)
     descent, batch = some(four_bar(), [timed(CLOSED), limit], CRANK_ROCKERS)
