@@ -374,6 +374,7 @@ def test_that_lengths_are_judged_by_the_size_that_they_have(factor, monkeypatch)
         assert now.success
         assert 0.4 < sizes[-1] / (first * scale) < 2.5
     assert sizes[-1] / first == pytest.approx(factor**699, rel=1.5)
+    assert len(sizes) < 20  # once for each doubling, and not at each step
 
 
 def test_that_no_array_of_a_caller_is_kept():
