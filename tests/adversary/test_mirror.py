@@ -144,7 +144,8 @@ def test_the_mirror_of_every_type(in_space, record):
 @pytest.mark.filterwarnings("ignore::kincompile.RedundantConstraintWarning")
 @PLANES
 def test_the_mirror_of_sensitivities(in_space, record):
-    entries = [
-        compare_sensitivities(first_of(in_space, kind, None, k)) for kind, _, k in each(in_space)
-    ]
-    record(tried=sum(entries), wrong=0)
+    # With loads no freedom is held that nothing sees: the mirror has no such rows.
+    record(
+        tried=sum(compare_sensitivities(first_of(in_space, *item)) for item in each(in_space)),
+        wrong=0,
+    )
