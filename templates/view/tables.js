@@ -93,7 +93,8 @@ const numbers = {
       row.append(cell(name, 'th'), cell(is_driver ? `${kind}, driver` : kind), cell(''));
       return row;
     });
-    const named = [[this.rows, player.data.coordinates], [this.observed, player.data.outputs], [this.joints, player.data.drawing.joints]];
+    const named = [[this.rows, player.data.coordinates], [this.observed, player.data.outputs], [this.joints, player.data.drawing.joints],
+      [this.transmitted, this.ready.map(({ label }) => ({ name: label }))]];
     const find = rowFinder('Find in the tables', () => named.flatMap(([rows, items]) => rows.map((row, k) => [`${items[k].name} ${symbolText(items[k].name)}`, row])));
     bar.append(this.at, find, this.copy);
     panel.append(bar, ...(this.observed.length ? [wide(this.outputs)] : []), ...(this.ready.length ? [wide(found)] : []), wide(this.motion), wide(this.equations));

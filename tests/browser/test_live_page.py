@@ -171,7 +171,7 @@ def test_that_paths_plots_numbers_and_newton_follow(open_page: Callable[..., Any
     plotted = page.evaluate("[plots.list[0].x, plots.list[0].y]")
     np.testing.assert_allclose(np.transpose(plotted), solution.observed.y, atol=1e-9)
     page.get_by_role("tab", name="Numbers").click()
-    row = page.locator("#panel-numbers tr", has_text="phi_rocker").locator("td").nth(1)
+    row = page.locator("#panel-numbers tr", has_text="φrocker").locator("td").nth(1)
     assert float(row.inner_text()) == pytest.approx(solution["phi_rocker"][20], rel=1e-6)
     residual = array(page, "residual").reshape(61, -1)
     assert residual.max() < 1e-12

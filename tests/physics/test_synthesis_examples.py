@@ -53,5 +53,5 @@ def test_that_five_poses_are_met(capsys):
 
 
 def test_that_there_is_a_test_of_every_example():
-    names = {"dwell_six_bar.py", "dwell_six_bar.toml", "five_poses.py"}
+    names = {"dwell_six_bar.py", "dwell_six_bar.toml", "five_poses.py", "five_poses.toml"}
     assert {path.name for path in FOLDER.iterdir() if path.suffix} == names

@@ -37,7 +37,8 @@ def test_that_all_is_every_extra_for_users():
     (all_of,) = EXTRAS["all"]
     names = re.fullmatch(r"kincompile\[(.*)\]", all_of)
     assert names is not None
-    assert set(names[1].split(",")) == set(EXTRAS) - FOR_DEVELOPERS - {"all"}
+    # Graders of courses bring a hundred packages, and run where a course is.
+    assert set(names[1].split(",")) == set(EXTRAS) - FOR_DEVELOPERS - {"all", "courses"}
 
 
 @pytest.mark.parametrize("page", ["docs/install.md"])
