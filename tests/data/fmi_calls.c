@@ -72,6 +72,7 @@ static int run(fmi3Instance unit, fmi3ValueReference all, int turn, bool has_der
     NEED(fmi3FreeFMUState(unit, &kept));
     NEED(fmi3FreeFMUState(unit, &again));
     NEED(fmi3FreeFMUState(unit, NULL)); // is ignored, as FMI 3.0 says
+    NEED(fmi3Reset(unit));
     if (has_derivatives) {
         NEED(fmi3EnterInitializationMode(unit, false, 0, 0, false, 0));
         NEED(fmi3GetDirectionalDerivative(unit, NULL, 0, NULL, 0, NULL, 0, NULL, 0));
