@@ -48,22 +48,25 @@ class Loose:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Web:
-    """Which bodies are joined: the names of the others for each, among them the ground's."""
+    """Which bodies are joined: for each its joints and the names of the others, or the ground."""
 
     joints: Sequence[Joint]
+    own: Mapping[str, Sequence[Joint]]
     others: Mapping[str, frozenset[str]]
 
     @classmethod
     def of(cls, system: ConstraintSystem) -> Web:
         """Return who is joined to whom; a constraint of one body joins it to the ground."""
         joints = [x for x in system.constraints if isinstance(x, Joint) and not x.written.is_own]
-        others: dict[str, set[str]] = {body.name: set() for body in system.bodies}
+        own: dict[str, list[Joint]] = {body.name: [] for body in system.bodies}
+        others: dict[str, set[str]] = {name: set() for name in own}
         for item in joints:
             names = {body.name for body in item.bodies}
             names |= {system.ground.name} if len(names) == 1 else set()
-            for name in names & others.keys():
+            for name in names & own.keys():
+                own[name].append(item)
                 others[name] |= names - {name}
-        return cls(joints, {name: frozenset(some) for name, some in others.items()})
+        return cls(joints, own, {name: frozenset(some) for name, some in others.items()})
 
     def groups(self, names: Collection[str]) -> Iterator[set[str]]:
         """Yield bodies out of some that hang together."""
@@ -88,13 +91,13 @@ def loose_bodies(system: ConstraintSystem) -> dict[str, Loose]:
     defaults = {x.name: float(x.default or 0.0) for x in system.parameters}
     joined = [body for body in system.bodies if len(web.others[body.name]) > 1]
     # Angles alone hold no body in place: what is missing there is a joint.
-    found = {body.name: _centres(body, web.joints, defaults) for body in joined}
+    found = {body.name: _centres(body, web.own[body.name], defaults) for body in joined}
     centres = {name: own for name, own in found.items() if len(own)}
     size = max((np.abs(x).max(initial=0.0) for x in centres.values()), default=0.0)
     left = {name: _loose(own, size) for name, own in centres.items()}
     while True:
         before = left
-        left = {name: _narrowed(name, before, web.joints, defaults) for name in before}
+        left = {name: _narrowed(name, before, web.own[name], defaults) for name in before}
         left = {name: item for name, item in left.items() if len(item.directions)}
         if [len(x.directions) for x in left.values()] == [
             len(x.directions) for x in before.values()
@@ -111,7 +114,7 @@ def _sides(item: Joint) -> Iterator[tuple[str, str]]:
 
 
 def _centres(body: Body, joints: Sequence[Joint], defaults: Mapping[str, float]) -> Array:
-    """Return the centres of the joints of a body, in its frame."""
+    """Return the centres of a body's joints, in its frame."""
     found = [
         _numbers(item.points[given.symbol], defaults)
         for item in joints
@@ -151,11 +154,11 @@ def _numbers(given: Sequence[Scalar], defaults: Mapping[str, float]) -> list[flo
 def _narrowed(
     name: str, found: Mapping[str, Loose], joints: Sequence[Joint], defaults: Mapping[str, float]
 ) -> Loose:
-    """Return a body with the axes that joints to bodies at rest leave to it."""
+    """Return a body with the axes that its joints to bodies at rest leave to it."""
     own = found[name]
     for item in joints:
         letters = dict(_sides(item))
-        if name not in letters or any(x != name and x in found for x in letters):
+        if any(x != name and x in found for x in letters):
             continue
         if item.type_name in RIGID:
             return replace(own, directions=own.directions[:0])

@@ -66,7 +66,7 @@ def evaluator(name: str, code: InlineProgram, listing: Listing, printer: Printer
     for node, k in places.items():
         nodes[node] = ("input", f"at->of_angles[{k}][lane]")
     names = {node: name for node, name in listing.names.items() if node not in places}
-    angles = _angles(code, listing, nodes, _Printer(C, nodes, names, code.program.name))
+    angles = _angles(code, listing, places, nodes, _Printer(C, nodes, names, code.program.name))
     rest = _only(listing, nodes, _results(listing))
     body = WRITE.evaluation(code, rest, _Printer(C, nodes, listing.names, code.program.name))
     return [*head, *_angles_at(name, angles), "", *_point_function(name, body), "", *_both(name)]
@@ -109,11 +109,15 @@ def _only(listing: Listing, nodes: Sequence[Node], wanted: Iterable[int]) -> Lis
 
 
 def _angles(
-    code: InlineProgram, listing: Listing, nodes: Sequence[Node], printer: Printer
+    code: InlineProgram,
+    listing: Listing,
+    places: Iterable[int],
+    nodes: Sequence[Node],
+    printer: Printer,
 ) -> list[str]:
-    """Return the statements that put cosines and sines where a function reads them."""
+    """Return the statements that put cosines and sines in their places."""
     calls: dict[int, dict[str, int]] = {}
-    for node in places_of_angles(code, _results(listing)):
+    for node in places:
         _, function, angle = code.nodes[node]
         calls.setdefault(angle, {})[function] = node
     needed = _only(listing, nodes, calls)
