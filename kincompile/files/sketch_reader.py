@@ -47,13 +47,17 @@ class SketchReader(FieldReader):
         self, name: str, options: Row, parameters: Sequence[Parameter], given: Any
     ) -> Mechanism:
         """Return what a drawing makes; as far as it is good an empty mechanism."""
-        sketch: Any = self.words.sketch()(name, **options)
+        known = fields_of("sketch", self.words.count)
+        given_live = given.get("live") if isinstance(given, dict) else None
+        live = None if given_live is None else self.value(
+            given_live, known["live"].schema, (*PLACE, "live")
+        )
+        sketch: Any = self.words.sketch()(name, live=live, **options)
         for item in parameters:
             sketch.parameter(item.name, item.default, item.unit, item.range)
         if not isinstance(given, dict):
             self.problem(PLACE, f"expected a table, not {shown(given)}")
             return self.words.mechanism(name)
-        known = fields_of("sketch", self.words.count)
         self.has_fields(PLACE, given, known)
         for key, address, value in self._named(given, "lengths"):
             sketch.length(key, self.number(value, address))
@@ -66,6 +70,9 @@ class SketchReader(FieldReader):
                 )
                 getattr(sketch, section)(**{key: place or (0,) * self.words.count})
                 self.remember(f"{'hinge' if section == 'hinges' else 'joint'} {key!r}", address)
+                for own in sketch.coordinates_of(key) if section != "hinges" else ():
+                    self.names[own] = sympy.Symbol(own)
+                    self.remember(f"parameter {own!r}", address)
         self.remember("no link has the joint", (*PLACE, "joints"))
         for k, row in enumerate(self._within(given, "parts", [])):
             self._part(sketch, (*PLACE, "parts", k), row)

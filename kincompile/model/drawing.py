@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+
+import sympy
 
 from kincompile.errors import ModelError
 from kincompile.model.absolute import AbsoluteX, AbsoluteY
@@ -11,6 +17,7 @@ from kincompile.model.arguments import Kind
 from kincompile.model.bodies import Body
 from kincompile.model.constraint import Constraint, Element
 from kincompile.model.equation import Equation
+from kincompile.model.link_shape import number
 from kincompile.model.mechanism import Mechanism
 from kincompile.model.points import BodyPoint
 from kincompile.model.relative import Distance
@@ -18,9 +25,7 @@ from kincompile.model.sketch_parts import Drawn, Line, Link
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    import sympy
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from kincompile.model.arguments import BodyLike, PointLike, ValueLike
     from kincompile.model.expressions import Scalar, Scalars
@@ -29,6 +34,22 @@ if TYPE_CHECKING:
 Item = TypeVar("Item", bound=Element | Equation)
 Made = TypeVar("Made", bound=Body)
 """The type of bodies."""
+
+_IS_LIVE: ContextVar[bool] = ContextVar("is_live", default=False)
+
+
+@contextmanager
+def live_drawings() -> Iterator[None]:
+    """Let drawings that do not say whether they are live be so."""
+    token = _IS_LIVE.set(True)
+    try:
+        yield
+    finally:
+        _IS_LIVE.reset(token)
+
+
+def _is_number(value: Scalar) -> bool:
+    return not isinstance(value, sympy.Expr) or not value.free_symbols
 
 
 class Drawing(Generic[Made]):
@@ -40,6 +61,9 @@ class Drawing(Generic[Made]):
     ----------
     name, length_unit, mass_unit, end, points
         As for `Mechanism`.
+    live
+        Whether each number of a joint's place is a parameter, ``A_x`` and ``A_y`` of a joint A, so
+        that a page can pull it.
     """
 
     builder: ClassVar[type[Mechanism]] = Mechanism
@@ -54,10 +78,11 @@ class Drawing(Generic[Made]):
         mass_unit: str = "kg",
         end: Scalar = 1.0,
         points: int = 101,
+        live: bool | None = None,
     ) -> None:
         units = {"length_unit": length_unit, "mass_unit": mass_unit}
         self._mechanism = self.builder(name, **units, end=end, points=points)
-        self._drawn = Drawn(self._mechanism)
+        self._drawn = Drawn(self._mechanism, is_live=_IS_LIVE.get() if live is None else live)
 
     def parameter(
         self,
@@ -100,7 +125,21 @@ class Drawing(Generic[Made]):
             if name in self._drawn.joints:
                 self._drawn.problems.append(f"joint {name!r} is drawn twice; draw it once")
             where = self._drawn.place(place, f"joint {name!r}")
+            if self._drawn.is_live:
+                where = self._live(name, where)
             self._drawn.joints[name] = where
+
+    def _live(self, name: str, where: Point) -> Point:
+        """Return the place of a joint with a parameter for each number of it."""
+        return tuple(
+            self.length(f"{name}_{letter}", float(part)) if _is_number(part) else part
+            for letter, part in zip(self.coordinates, where, strict=True)
+        )
+
+    def coordinates_of(self, joint: str) -> list[str]:
+        """Return the names of the parameters that a joint of a live drawing brings."""
+        symbols = map(str, self._drawn.joints.get(joint, ()) if self._drawn.is_live else ())
+        return [name for name in symbols if name in {f"{joint}_{x}" for x in self.coordinates}]
 
     def ground(self, /, **places: PointLike) -> None:
         """Draw joints of the ground, as `joints` does: these are exactly where they are drawn."""
@@ -203,7 +242,22 @@ class Drawing(Generic[Made]):
         if problems:
             raise ModelError(list(dict.fromkeys(problems)))
         self._name_points()
+        if drawn.is_live:
+            self._give_ranges()
         return self._mechanism
+
+    def _give_ranges(self) -> None:
+        """Let each coordinate of a joint go as far as the drawing is long, either way."""
+        parameters, places = self._mechanism.parameters, self._drawn.joints.items()
+        own = {parameter for name, _ in places for parameter in self.coordinates_of(name)}
+        values = self._drawn.values
+        columns = zip(*([number(part, values) for part in place] for _, place in places))
+        size = math.hypot(*(max(column) - min(column) for column in columns)) or 1.0
+        reach = float(f"{size:.1g}")
+        for k, item in enumerate(parameters):
+            if item.name in own and item.range is None and item.default is not None:
+                ends = (item.default - reach, item.default + reach)
+                parameters[k] = replace(item, range=ends)
 
     def _name_points(self) -> None:
         """Name the free ends: joints that one moving link has alone, and no other link holds.

@@ -106,7 +106,13 @@ def _as_drawn(link: Outline, joint: str) -> Point:
     x, y = _from_to(link, first, joint)
     xi, eta = (x * along_x + y * along_y) / reach, (y * along_x - x * along_y) / reach
     size = number(reach, link.values)
-    return (xi, 0 if abs(number(eta, link.values)) <= FLAT * size else eta)
+    is_flat = abs(number(eta, link.values)) <= FLAT * size and _is_zero(eta)
+    return (xi, 0 if is_flat else eta)
+
+
+def _is_zero(value: Scalar) -> bool:
+    """Return whether a number that is nearly zero is so at all values of its parameters."""
+    return not isinstance(value, sympy.Expr) or not value.free_symbols or sympy.expand(value) == 0
 
 
 def _next(link: Outline, missing: Sequence[str], found: Iterable[str]) -> tuple[str, str, str]:
@@ -173,7 +179,7 @@ def _height(
 
 def _no_height(corners: tuple[str, str, str], square: sympy.Expr) -> Scalar:
     """Return 0, the height of three joints on a line, if they are on it at all parameters."""
-    if square.is_number or sympy.expand(square) == 0:
+    if _is_zero(square):
         return 0
     raise ShapeError(
         f"{listed(corners)} are on one line, and another value of a parameter would tear them "

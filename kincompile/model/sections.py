@@ -137,6 +137,10 @@ class Drawing:
     joints: Mapping[str, Any] | None = given(
         kind.named(_PLACE), "Joints, roughly.", default=None, unit="length"
     )
+    live: bool | None = given(
+        kind.FLAG, "Whether each number of a joint's place is a parameter, as `A_x` and `A_y`.",
+        default=None,
+    )  # fmt: skip
     parts: Sequence[Any] = given(
         kind.tables("part"), "Links and others, in their order.", kw_only=True
     )

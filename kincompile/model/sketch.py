@@ -16,7 +16,7 @@ from kincompile.model.joints import (
     Translational,
     TranslationalDistance,
 )
-from kincompile.model.link_shape import ShapeError, drawn_angle, shape
+from kincompile.model.link_shape import ShapeError, shape
 from kincompile.model.relative import RelativeAngle
 from kincompile.model.sketch_parts import Line, Link, minus
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from kincompile.model.arguments import BodyLike, PointLike, ValueLike
     from kincompile.model.constraint import Constraint
+    from kincompile.model.expressions import Scalar
     from kincompile.model.scope import Point
 
 
@@ -42,6 +43,8 @@ class Sketch(Drawing[Body]):
     ----------
     name, length_unit, mass_unit, end, points
         As for `Mechanism`.
+    live
+        As for `Drawing`: each number of a joint's place is a parameter, ``A_x`` and ``A_y``.
     """
 
     def link(
@@ -96,7 +99,7 @@ class Sketch(Drawing[Body]):
             heavy = mass_of_link([*places.values()], given, drawn.values)
         except ShapeError as error:
             drawn.problems.append(f"{what}: {error}")
-        angle = drawn_angle(outline, named[0], named[1])
+        angle = drawn.angle(named[0], named[1])
         return self._added(name, places, drawn.joints[named[0]], angle, **heavy)
 
     def wheel(
@@ -177,7 +180,7 @@ class Sketch(Drawing[Body]):
         named = drawn.named((centre_i, centre_j), what, 2, most=2)
         if named is None or first is None or second is None:
             return
-        towards = drawn_angle(drawn.outline(named), *named)
+        towards = drawn.angle(*named)
         wheel_i = (first.body, self.place(i, centre_i), radius_i, towards - first.angle)
         wheel_j = (second.body, self.place(j, centre_j), radius_j, towards + math.pi - second.angle)
         self.add(Gear(name, *wheel_i, *wheel_j))
@@ -205,7 +208,7 @@ class Sketch(Drawing[Body]):
         name: str,
         places: Mapping[str, Point] | None = None,
         origin: Point = (0, 0),
-        angle: float = 0.0,
+        angle: Scalar = 0.0,
         guide: Line | None = None,
         **heavy: Any,
     ) -> Body:

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import sympy
+
 from kincompile.model.bodies import Body, default_values
 from kincompile.model.expressions import (
     CALCULATED,
@@ -14,7 +16,13 @@ from kincompile.model.expressions import (
     Scalar,
     as_expression,
 )
-from kincompile.model.link_shape import Outline, listed_pairs, number, pairs_by_name
+from kincompile.model.link_shape import (
+    Outline,
+    drawn_angle,
+    listed_pairs,
+    number,
+    pairs_by_name,
+)
 from kincompile.names import listed, suggestion
 
 if TYPE_CHECKING:
@@ -31,7 +39,7 @@ class Link:
 
     body: Body
     places: Mapping[str, Point]  # its joints in the frame of the body
-    angle: float = 0.0  # angle of the body in the drawing [rad]
+    angle: Scalar = 0.0  # angle of the body in the drawing [rad]
     guide: Line | None = None  # of a slider, the line along which it slides
     # In space the axis of the first hinge in which it hangs, on the other link.
     hinge: Line | None = None
@@ -40,7 +48,12 @@ class Link:
         """Return a vector of the drawing in the frame of the link."""
         if not self.angle:
             return vector
-        cosine, sine = float(CALCULATED.cos(self.angle)), float(CALCULATED.sin(self.angle))
+        cosine: Scalar
+        sine: Scalar
+        if isinstance(self.angle, sympy.Expr):
+            cosine, sine = sympy.cos(self.angle), sympy.sin(self.angle)
+        else:
+            cosine, sine = float(CALCULATED.cos(self.angle)), float(CALCULATED.sin(self.angle))
         x, y = vector
         return x * cosine + y * sine, y * cosine - x * sine
 
@@ -71,6 +84,7 @@ class Drawn:
     links: dict[str, Link] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
     axes: dict[str, Point] = field(default_factory=dict)  # of hinges in space
+    is_live: bool = False  # whether places of joints are parameters
 
     def __post_init__(self) -> None:
         ground = self.mechanism.ground
@@ -146,6 +160,14 @@ class Drawn:
         """Return what is known of a link with these joints."""
         unit = self.mechanism.length_unit
         return Outline(joints, self.joints, lengths or {}, places or {}, self.values, unit)
+
+    def angle(self, one: str, other: str) -> Scalar:
+        """Return the direction from one joint to another [rad], of a live drawing an expression."""
+        if not self.is_live:
+            return drawn_angle(self.outline((one, other)), one, other)
+        x, y = minus(self.joints[other], self.joints[one])
+        angle: sympy.Expr = sympy.atan2(y, x)
+        return angle
 
     @property
     def values(self) -> dict[str, float]:

@@ -54,6 +54,8 @@ class Sketch(Drawing[SpatialBody]):
     ----------
     name, length_unit, mass_unit, end, points
         As for `Mechanism`.
+    live
+        As for `Drawing`: each number of a joint's place is a parameter, ``A_x``, ``A_y``, ``A_z``.
     """
 
     builder = Mechanism
