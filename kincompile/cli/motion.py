@@ -39,6 +39,11 @@ class Motion:
     through: str | None = None
     assembly: int | None = None
 
+    @property
+    def names(self) -> list[str]:
+        """The names of what is set."""
+        return [item.partition("=")[0].strip() for item in self.values]
+
     def numbers(self, model: Mechanism | ConstraintSystem) -> dict[str, float]:
         """Return the values of parameters that are set."""
         return set_values(model, self.values)

@@ -79,7 +79,7 @@ def command(
     if output is not None:
         require_known_suffix(output)
         shared.require_output(output, model, "the model itself")
-    mechanism = shared.read_model(model)
+    mechanism = shared.read_drawn(model, [*motion.names, *sweeps])
     if analysis is not None:
         settings = kc.read_analysis(analysis)
         motion = replace(

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, NoReturn
 import click
 
 import kincompile as kc
-from kincompile.errors import InputError
+from kincompile.errors import InputError, KincompileError
 from kincompile.model.declared import declared_fields
+from kincompile.model.live_drawings import live_drawings
 from kincompile.names import transmission_ends
 from kincompile.writing import require_writable, write_atomically
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
@@ -40,6 +41,28 @@ def read_model(model: str) -> Mechanism | ConstraintSystem:
     with redirect_stdout(sys.stderr):
         read: Mechanism | ConstraintSystem = kc.read_model(model)
     return read
+
+
+def read_drawn(
+    model: str, names: Iterable[str] = (), *, is_pulled: bool = False
+) -> Mechanism | ConstraintSystem:
+    """Read a model, with the coordinates of its drawn joints as parameters where they are wanted.
+
+    They are where a name that is given is one of them, as ``B_x``, and where joints are to be
+    pulled on a page and the drawing declares no length.
+    """
+    read = read_model(model)
+    known = {item.name for item in read.parameters}
+    joints = {joint for places in getattr(read, "drawn", {}).values() for joint in places}
+    is_named = any(name not in known and name.rpartition("_")[0] in joints for name in names)
+    has_lengths = any(item.unit == read.length_unit for item in read.parameters)
+    if not joints or not (is_named or (is_pulled and not has_lengths)):
+        return read
+    with live_drawings():
+        try:
+            return read_model(model)
+        except KincompileError:  # it calculates with places, as numbers
+            return read
 
 
 def require_output(path: str | Path, read: str, what: str) -> None:

@@ -14,7 +14,7 @@ from kincompile.cli.shared import (
     deg_option,
     on_screen,
     output_option,
-    read_model,
+    read_drawn,
     reasons_of,
     tabled_ends,
     transmission_option,
@@ -75,7 +75,7 @@ def command(
         raise InputError(f"{output} is not the name of a page: end it in .html, or name a folder")
     if is_page and len(models) > 1:
         raise InputError(f"{output}: {len(models)} pages do not go into one file; name a folder")
-    read = [read_model(model) for model in models]
+    read = [read_drawn(model, motion.names, is_pulled=True) for model in models]
     options: dict[str, Any] = {
         "through": motion.through, "assembly": motion.assembly, "angle_unit": angle_unit,
     }  # fmt: skip

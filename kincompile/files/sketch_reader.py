@@ -49,8 +49,10 @@ class SketchReader(FieldReader):
         """Return what a drawing makes; as far as it is good an empty mechanism."""
         known = fields_of("sketch", self.words.count)
         given_live = given.get("live") if isinstance(given, dict) else None
-        live = None if given_live is None else self.value(
-            given_live, known["live"].schema, (*PLACE, "live")
+        live = (
+            None
+            if given_live is None
+            else self.value(given_live, known["live"].schema, (*PLACE, "live"))
         )
         sketch: Any = self.words.sketch()(name, live=live, **options)
         for item in parameters:

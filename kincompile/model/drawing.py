@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
@@ -18,6 +16,7 @@ from kincompile.model.bodies import Body
 from kincompile.model.constraint import Constraint, Element
 from kincompile.model.equation import Equation
 from kincompile.model.link_shape import number
+from kincompile.model.live_drawings import are_live
 from kincompile.model.mechanism import Mechanism
 from kincompile.model.points import BodyPoint
 from kincompile.model.relative import Distance
@@ -25,7 +24,7 @@ from kincompile.model.sketch_parts import Drawn, Line, Link
 from kincompile.names import listed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from kincompile.model.arguments import BodyLike, PointLike, ValueLike
     from kincompile.model.expressions import Scalar, Scalars
@@ -34,18 +33,6 @@ if TYPE_CHECKING:
 Item = TypeVar("Item", bound=Element | Equation)
 Made = TypeVar("Made", bound=Body)
 """The type of bodies."""
-
-_IS_LIVE: ContextVar[bool] = ContextVar("is_live", default=False)
-
-
-@contextmanager
-def live_drawings() -> Iterator[None]:
-    """Let drawings that do not say whether they are live be so."""
-    token = _IS_LIVE.set(True)
-    try:
-        yield
-    finally:
-        _IS_LIVE.reset(token)
 
 
 def _is_number(value: Scalar) -> bool:
@@ -82,7 +69,7 @@ class Drawing(Generic[Made]):
     ) -> None:
         units = {"length_unit": length_unit, "mass_unit": mass_unit}
         self._mechanism = self.builder(name, **units, end=end, points=points)
-        self._drawn = Drawn(self._mechanism, is_live=_IS_LIVE.get() if live is None else live)
+        self._drawn = Drawn(self._mechanism, is_live=are_live() if live is None else live)
 
     def parameter(
         self,
@@ -248,11 +235,12 @@ class Drawing(Generic[Made]):
 
     def _give_ranges(self) -> None:
         """Let each coordinate of a joint go as far as the drawing is long, either way."""
-        parameters, places = self._mechanism.parameters, self._drawn.joints.items()
+        drawn, parameters = self._drawn, self._mechanism.parameters
+        places = drawn.joints.items()
         own = {parameter for name, _ in places for parameter in self.coordinates_of(name)}
-        values = self._drawn.values
-        columns = zip(*([number(part, values) for part in place] for _, place in places))
-        size = math.hypot(*(max(column) - min(column) for column in columns)) or 1.0
+        values = drawn.values
+        columns = [[number(place[k], values) for _, place in places] for k in range(drawn.size)]
+        size = math.hypot(*(max(own) - min(own) for own in columns if own)) or 1.0
         reach = float(f"{size:.1g}")
         for k, item in enumerate(parameters):
             if item.name in own and item.range is None and item.default is not None:

@@ -14,6 +14,7 @@ from kincompile.model.mechanism import system_of
 from kincompile.model.resolve import Joint
 from kincompile.view.body_shapes import links, outlines
 from kincompile.view.geometry import Geometry, JointGeometry
+from kincompile.view.hands import Hand, guess_of, hands_of
 from kincompile.view.joint_shapes import marks_of
 from kincompile.view.marks import (
     GROUND_FRAME,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from kincompile.model.mechanism import Mechanism
+    from kincompile.model.scope import Point
     from kincompile.model.system import ConstraintSystem
     from kincompile.view.marks import Array
 
@@ -77,6 +79,9 @@ class Drawing:
     joints: tuple[JointLabel, ...]
     size: float  # the length in which pins and blocks are measured
     four_bars: tuple[FourBarLoop, ...] = ()  # with numbers as lengths
+    # For a page: what can be pulled, and where the solver starts.
+    hands: tuple[Hand, ...] = ()
+    guess: tuple[float, ...] = ()
 
     @property
     def dots(self) -> tuple[Dot, ...]:
@@ -123,6 +128,7 @@ def drawing(
     model: Mechanism | ConstraintSystem,
     p: Mapping[str, float] | None = None,
     q: ArrayLike | None = None,
+    drawn: Mapping[str, Mapping[str, Point]] | None = None,
 ) -> Drawing:
     """Derive the shapes of a mechanism.
 
@@ -134,6 +140,8 @@ def drawing(
         Values of parameters by name; others have their defaults.
     q : array_like, shape (n,) or (N, n), optional
         Positions that the rails must reach; without, the guess.
+    drawn
+        Joints of a drawing, as `Mechanism.drawn`: the hands and the guess are found too.
 
     Raises
     ------
@@ -179,7 +187,11 @@ def drawing(
         item._replace(lengths=tuple(map(geometry.number, item.lengths)))
         for item in four_bar_loops(system)
     )
-    return Drawing(system.name, names, frames, tuple(ordered), labels, size, four_bars)
+    found = Drawing(system.name, names, frames, tuple(ordered), labels, size, four_bars)
+    if drawn is None:
+        return found
+    hands, start = hands_of(system, drawn, geometry), guess_of(system, geometry)
+    return replace(found, hands=hands, guess=start)
 
 
 def _labels(

@@ -164,7 +164,8 @@ def page(
         _require_motion_of(system, solution)
         message = solution.message
     is_given = assembly is not None or module is None
-    shown = page_data(system, solution, message, starts_there=is_given)
+    drawn = getattr(model, "drawn", None)
+    shown = page_data(system, solution, message, starts_there=is_given, drawn=drawn)
     shown["angleUnit"] = angle_unit
     script, shown["transmission"] = transmission_script(system, transmission)
     if solution is None and shown["transmission"]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from kincompile.model.bodies import Parameter
+    from kincompile.model.scope import Point
     from kincompile.model.system import ConstraintSystem
     from kincompile.runtime.results.solution import Solution
     from kincompile.view.drawing import Drawing
@@ -48,6 +50,7 @@ def page_data(
     message: str,
     *,
     starts_there: bool = False,
+    drawn: Mapping[str, Mapping[str, Point]] | None = None,
 ) -> dict[str, Any]:
     """Return the data that a page shows, as plain values and arrays, and a still picture.
 
@@ -55,6 +58,8 @@ def page_data(
     ----------
     starts_there
         Whether the page itself starts from the first position of the motion, not from the guess.
+    drawn
+        Joints of a drawing, as `Mechanism.drawn`.
     """
     guess = np.array([item.guess for item in system.coordinates])
     values = {item.name: item.default or 0.0 for item in system.parameters}
@@ -63,7 +68,10 @@ def page_data(
     p = np.array(list(values.values()))
     arrays, status, events = _motion(guess, solution)
     t, q = arrays["t"], arrays["q"]
-    shapes = drawing(system, values, q)
+    shapes = drawing(system, values, q, drawn or {})
+    starts_there = starts_there and bool(np.isfinite(q[0]).all())
+    if starts_there:
+        shapes = replace(shapes, guess=tuple(q[0]))
     outputs: list[dict[str, str]] = []
     if solution is not None and solution.module is not None:
         arrays |= _checks(solution, solution.module, shapes, p)
@@ -83,7 +91,7 @@ def page_data(
         "outputs": outputs,
         "equations": list(system.equations),
         "parameters": [_parameter(item, values[item.name]) for item in system.parameters],
-        "start": (q[0] if starts_there and np.isfinite(q[0]).all() else guess).tolist(),
+        "start": list(shapes.guess),
         "grashof": {"roles": ROLES, "triple": TRIPLE, "change": CHANGE, "same": SAME},
         "words": {**WORDS, **SENTENCES, **DOUBTS},
         "guess": guess.tolist(),
