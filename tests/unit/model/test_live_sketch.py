@@ -128,8 +128,8 @@ def test_that_a_file_of_it_starts_where_it_is_drawn_wherever_that_is(tmp_path):
         text = text.replace(was, f'"{name}", default = {value}')
     path.write_text(text)
     again, drawn = kc.read(path), four_bar(far)
-    guesses = [[item.guess for item in model.system().coordinates] for model in (again, drawn)]
-    np.testing.assert_allclose(*guesses, atol=1e-14)
+    found, known = ([item.guess for item in model.system().coordinates] for model in (again, drawn))
+    np.testing.assert_allclose(found, known, atol=1e-14)
 
 
 def test_that_what_is_on_a_line_in_the_drawing_need_not_stay_on_it():
