@@ -120,8 +120,8 @@ test-elsewhere: export GLIBC_TUNABLES := glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usabl
 test-elsewhere: $(TEST_READY)
 	@NPY_DISABLE_CPU_FEATURES="$$($(BIN)/python -c '$(FEATURES)')" $(PYTEST) --numprocesses=auto --dist=loadfile -m "not slow or printed" $(ROUNDED) $(NOT_ROUNDED)
 
-# The scripts of a page share one scope, so that each kind of page is read by itself.
-PAGES := plane space gallery watch
+# A page is of the plane or of space; what watches a file is no module.
+PAGES := plane space watch
 NODE_TOOL := PATH="$(CURDIR)/$(BIN):$$PATH" .ci/page/node_modules/.bin
 
 lint: $(LINT_READY)

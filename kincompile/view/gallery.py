@@ -18,8 +18,8 @@ from kincompile.report.templates import fill, read
 from kincompile.runtime.singular.assemblies import assemblies
 from kincompile.runtime.solve import solve
 from kincompile.view.drawing import drawing
+from kincompile.view.modules import WORLDS, joined, modules_of
 from kincompile.view.page_data import as_json
-from kincompile.view.page_scripts import WORLDS
 from kincompile.view.worlds import dimension_of
 from kincompile.writing import write_atomically
 
@@ -216,9 +216,8 @@ def _filled(title: str, cards: Sequence[Mapping[str, str]], dimensions: Iterable
         "title": title,
         "style": read("view/style.css") + read("view/gallery.css"),
         "scripts": [
-            read("view/player.js"),
             f"const worlds = {{\n{worlds} }};",
-            read("view/gallery.js"),
+            joined(modules_of("gallery.js", dimension=2)),
         ],
         "cards": cards,
     }
@@ -227,7 +226,7 @@ def _filled(title: str, cards: Sequence[Mapping[str, str]], dimensions: Iterable
 
 def _world(dimension: int) -> str:
     """Return the scripts that draw in the plane or in space, as a function of their own."""
-    scripts = "\n".join(read(f"view/{name}") for name in ("draw.js", WORLDS[dimension]))
+    scripts = joined(["draw.js", WORLDS[dimension]])
     return f"(() => {{\n{scripts}\n{DRAWS}\n}})()"
 
 

@@ -17,9 +17,9 @@ from kincompile.report.templates import fill, read
 from kincompile.runtime.results.columns import shown_unit
 from kincompile.runtime.results.solution import Solution, require_solution
 from kincompile.runtime.solve import solve
+from kincompile.view.modules import joined, modules_of
 from kincompile.view.page_data import as_json, page_data
 from kincompile.view.page_scripts import (
-    WORLDS,
     forces_script,
     geometry_script,
     solver_script,
@@ -40,16 +40,6 @@ if TYPE_CHECKING:
 
 STYLES = ("style.css", "newton.css", "live.css", "transmission.css")
 """Style sheets, in order."""
-
-SCRIPTS = (
-    "player.js", "units.js", "draw.js", "stage.js", "poles.js", "forces.js",
-    "tools.js", "tip.js", "columns.js",
-    "plots.js", "tables.js", "showing.js", "newton.js", "newton_tables.js", "newton_stage.js",
-    "newton_panel.js", "sliders.js", "live.js", "settings.js", "taken.js", "measures.js", "grab.js",
-    "transmission.js", "transmission_map.js", "transmission_panel.js", "start.js",
-)  # fmt: skip
-"""Scripts, in order: each uses those before it, and the emitted module."""
-
 
 FRAME_HEIGHT = "720px"
 """Height of a page inside a notebook."""
@@ -179,18 +169,12 @@ def page(
             script,
             forces_script(system),
             geometry_script(system, shown["drawing"]),
-            *(read(f"view/{name}") for name in scripts_for(dimension_of(system))),
+            joined(modules_of("start.js", dimension_of(system))),
         ],
         "still": shown.pop("still"),
         "data": as_json(shown),
     }
     return Page(system.name, fill("view/page.html.jinja", slots), shown)
-
-
-def scripts_for(dimension: int) -> list[str]:
-    """Return the scripts of a page of the plane or of space, in order."""
-    place = SCRIPTS.index("draw.js") + 1
-    return [*SCRIPTS[:place], WORLDS[dimension], *SCRIPTS[place:]]
 
 
 def _require_motion_of(system: ConstraintSystem, solution: Solution) -> None:

@@ -31,10 +31,6 @@ if TYPE_CHECKING:
 MOST_COORDINATES = 150
 """Coordinates up to which a page solves the mechanism itself."""
 
-
-WORLDS = {2: "plane.js", 3: "space.js"}
-"""The script that draws in the plane or in space, by dimension: it follows `draw.js`."""
-
 DEPENDENT = "its equations depend on each other at every position."
 """Why a mechanism that could be emitted has no solver."""
 

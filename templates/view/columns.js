@@ -1,13 +1,18 @@
-'use strict';
 /* What can be plotted, listed and saved: columns of numbers over the solved times.
 
    columns.groups()     [{ title, items: [{ label, unit, isLog, values() }] }], what the model names first
    columns.find(label)  one of them; 'path of P' has `path`, the labels of its two columns */
 
-const LARGEST = 1e300;  // number whose differences are finite too
+import { player } from './player.js';
+import { LARGEST, symbolText, units } from './units.js';
+import { AXES, inWorld, isSpatial, liveliestOf, ratesInWorld } from '#world';
+import { stage } from './stage.js';
+import { reactions } from './forces.js';
+import { settings } from './settings.js';
+
 const RATES = [['', ''], ['_dot', '/s'], ['_ddot', '/s²']];
 
-const columns = {
+export const columns = {
   forget() {
     this.kept = new Map();
   },
@@ -54,7 +59,7 @@ const columns = {
 };
 
 /* A number that has a place on an axis, else null. */
-function finite(value) {
+export function finite(value) {
   return Math.abs(value) < LARGEST ? value : null;
 }
 
@@ -63,7 +68,7 @@ function entries(name, k, width) {
 }
 
 /* Outputs, those of the model before the coordinates of its points. */
-function named({ outputs, drawing }) {
+export function named({ outputs, drawing }) {
   const dots = drawing.marks.filter(mark => mark.kind === 'dot').flatMap(({ name }) => AXES.map(axis => `${axis}_${name}`));
   const isDot = ({ name }) => dots.includes(name);
   return [...outputs.filter(output => !isDot(output)), ...outputs.filter(isDot)];
@@ -156,7 +161,7 @@ function moves(item) {
 
 /* What is plotted when the page opens: the first output that moves, with its rates; else of the
    first point of uneven speed its path, speed and acceleration; else the liveliest coordinate. */
-function plottedFirst() {
+export function plottedFirst() {
   const { data } = player, dots = stage.points.filter(point => point.isNamed);
   const outputs = named(data).slice(0, data.outputs.length - 2 * dots.length);
   const output = outputs.find(({ name }) => moves(columns.find(name)));
@@ -186,7 +191,7 @@ function liveliest() {
 }
 
 /* Pieces of time [from, to] in which something was not found. */
-function failures() {
+export function failures() {
   const { status } = player.data, pieces = [];
   for (let k = 0; k < player.count; k++) {
     if (status[k] === 0) continue;

@@ -1,4 +1,3 @@
-'use strict';
 /* The marks of a drawing on a canvas: what plane.js and space.js share.
 
    drawShapes(ctx, q, style) draws the mechanism at coordinates q, any number of times on one canvas.
@@ -14,19 +13,22 @@
 
    fitMarks makes rails and barrels fit a motion. */
 
-const GROUND = { index: -1, columns: [] };  // a frame: a body's index, and its columns of q
-const BARREL = 0.85;  // part of a cylinder's shortest length that its barrel has
-const SAME_POINT = 1e-9;  // relative distance up to which two points of a body are one
-const THICK = 8;  // pixels of a mark's size from which on lines grow with it
-const MOST_PIECES = 1000;  // of a line: one that has more goes off every screen
-const DASHES = { '': [], '--': [5, 4], ':': [4, 3] };
+import { player } from './player.js';
+import { drawMarks, inWorld } from '#world';
 
-function isGround(frame) {
+export const GROUND = { index: -1, columns: [] };  // a frame: a body's index, and its columns of q
+const BARREL = 0.85;  // part of a cylinder's shortest length that its barrel has
+export const SAME_POINT = 1e-9;  // relative distance up to which two points of a body are one
+const THICK = 8;  // pixels of a mark's size from which on lines grow with it
+export const MOST_PIECES = 1000;  // of a line: one that has more goes off every screen
+export const DASHES = { '': [], '--': [5, 4], ':': [4, 3] };
+
+export function isGround(frame) {
   return frame.index === GROUND.index;
 }
 
 /* What is drawn with: positions on the screen, sizes and colours. */
-class Pen {
+export class Pen {
   constructor(ctx, q, style, size) {
     this.ctx = ctx;
     this.q = q;
@@ -99,18 +101,18 @@ class Pen {
 }
 
 /* How far apart two places are. */
-function distanceBetween(from, to) {
+export function distanceBetween(from, to) {
   return Math.hypot(...to.map((x, k) => x - from[k]));
 }
 
 /* The direction from one point to another, of length one, and the distance. */
-function towards(from, to) {
+export function towards(from, to) {
   const [x0, y0] = from, [x1, y1] = to;
   const length = Math.hypot(x1 - x0, y1 - y0);
   return length ? [(x1 - x0) / length, (y1 - y0) / length, length] : [1, 0, 0];
 }
 
-function arrow(pen, from, to, colour, width = 2) {
+export function arrow(pen, from, to, colour, width = 2) {
   const [x, y, length] = towards(from, to);
   if (length < 1) return;
   const head = Math.min(9, 0.6 * length + 3);
@@ -124,13 +126,13 @@ function arrow(pen, from, to, colour, width = 2) {
 }
 
 /* The frame whose colour a stroke of a mark has. */
-function ownerOf(mark, on) {
+export function ownerOf(mark, on) {
   if (mark.first) return on === 'first' || on === 'barrel' ? mark.first.frame : mark.second.frame;
   return mark.place ? mark.place.frame : mark.frame;
 }
 
 /* The convex hull of points, counterclockwise; of points on a line its two ends. */
-function hullOf(points) {
+export function hullOf(points) {
   const turn = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
   const isNear = ([a, b], [x, y]) =>
     Math.max(Math.abs(a - x), Math.abs(b - y)) <= SAME_POINT * (1 + Math.max(Math.abs(x), Math.abs(y)));
@@ -147,7 +149,7 @@ function hullOf(points) {
   });
 }
 
-function drawShapes(ctx, q, style) {
+export function drawShapes(ctx, q, style) {
   const drawing = style.drawing ?? player.data.drawing;
   const pen = new Pen(ctx, q, { ...style, looks: drawing.looks }, drawing.size);
   ctx.save();
@@ -159,7 +161,7 @@ function drawShapes(ctx, q, style) {
 
 /* Rails as long as a motion, with their overhang, and barrels as long as they can be: as Python made
    them for the motion that the page was given (kincompile/view/geometry.py). */
-function fitMarks(motion) {
+export function fitMarks(motion) {
   const { marks, overhang } = motion.data.drawing;
   const states = motion.seen.map(state => state.q);
   const least = (values, from) => values.reduce((a, b) => Math.min(a, b), from);
@@ -191,7 +193,7 @@ const COLOURS = ['paper', 'ink', 'quiet', 'line', 'tint', 'bad', 'velocity', 'ac
   'plot', 'pole', 'force', 'measure'];
 
 /* The colours of the style sheet, and so of the theme; of each body a strong one and a tint. */
-function paletteNow(drawing = player.data.drawing) {
+export function paletteNow(drawing = player.data.drawing) {
   const probe = document.createElement('span');
   document.body.append(probe);
   /** @type {Object<string, any>} */
@@ -213,7 +215,7 @@ function channels(colour) {
   return colour.match(/[\d.]+/g).slice(0, 3).map(Number);
 }
 
-function blended(colour, paper, part) {
+export function blended(colour, paper, part) {
   const over = channels(paper);
   return `rgb(${channels(colour).map((c, k) => Math.round(part * c + (1 - part) * over[k])).join()})`;
 }

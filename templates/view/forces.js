@@ -1,12 +1,19 @@
-'use strict';
 /* Forces of the joints, as arrows on the drawing and in words beside a joint that is pointed at.
 
    `forces` is the module whose outputs are the forces along a motion, as kc.forces compiles it; null
    where the model has no loads, or redundant joints share them. An arrow is the force on body j. */
 
+import { player } from './player.js';
+import { units } from './units.js';
+import { arrow, Pen } from './draw.js';
+import { AXES, inWorld, isSpatial } from '#world';
+import { stage } from './stage.js';
+import { byId } from './elements.js';
+import { finite } from './columns.js';
+
 const FORCE_ARROW = 0.22;  // part of the canvas that the largest force takes
 
-const reactions = {
+export const reactions = {
   isShown: false,
   greatest: null,  // of all joints and times
   kept: null,  // all forces at all times

@@ -1,5 +1,6 @@
-'use strict';
 /* Every card's mechanism in motion, while it can be seen; at rest for those who ask for it. */
+
+import { Player, withArrays } from './player.js';
 
 const MARGIN = 10;
 const REST = 0.3;  // part of the motion that is shown at rest, where the data name no other

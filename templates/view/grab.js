@@ -1,10 +1,14 @@
-'use strict';
 /* The mechanism grabbed and moved: time follows the point of a body that is dragged. */
+
+import { player } from './player.js';
+import { distanceBetween } from './draw.js';
+import { heldAt, inWorld } from '#world';
+import { CLICK, hasMotion, stage } from './stage.js';
 
 const REACH = 0.15;  // part of the motion that is searched at once, forth and back
 const FINE = 8;  // places between two solved times
 
-class Grab {
+export class Grab {
   constructor() {
     this.held = null;  // { frame, point }: what of which body the pointer holds
     const listener = event => { if (this.held) event.preventDefault(); };  // nor does the page scroll

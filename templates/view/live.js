@@ -1,9 +1,17 @@
-'use strict';
 /* The mechanism solved again in the page: parameters that are pulled, what they make of motion,
    drawing and messages.
 
    live.set({ r: 0.12 })  solve again with these values, the others as they are
    live.reset()           back to what the page was made with */
+
+import { player } from './player.js';
+import { fitMarks } from './draw.js';
+import { AXES, boxOf, hullFor } from '#world';
+import { hasMotion, stage } from './stage.js';
+import { copied, numberText } from './tables.js';
+import { Slider } from './sliders.js';
+import { settings } from './settings.js';
+import { taken } from './taken.js';
 
 // As in kincompile/view/drawing.py: the mechanism's diagonal, and how far a guide is longer than the motion, in sizes of marks.
 const PARTS = 50;
@@ -13,7 +21,7 @@ const WARM = 120;  // milliseconds after which a page that rests solves once
 /* ---- drawing: numbers that depend on parameters or on the motion ---- */
 
 /* Give a drawing the numbers that parameters say. */
-function setNumbers(drawing, p) {
+export function setNumbers(drawing, p) {
   const at = place => place.reduce((item, key) => item[key], drawing);
   const values = geometry.numbers(0, p);
   geometry.places.forEach((place, k) => { at(place.slice(0, -1))[place[place.length - 1]] = values[k]; });
@@ -99,7 +107,7 @@ function verdictOf(motion, event) {
   return parts.join(' ');
 }
 
-function splitSentence(text) {
+export function splitSentence(text) {
   const place = text.indexOf(': ');
   return [text.slice(0, place), text.slice(place + 2)];
 }
@@ -147,7 +155,7 @@ function residualsOf(Phi) {
 
 /* ---- the panel ---- */
 
-const live = {
+export const live = {
   made: null,  // what of the data depends on the motion, as the page was made
   motion: null,  // the one shown, where the page solved for it; null for the one it was made with
   isChanged: false,  // whether a slider was pulled

@@ -1,7 +1,14 @@
-'use strict';
 /* What outputs do over the motion: extremes, dead points, time ratio, mean and RMS, as sol.measures()
    finds them (kincompile/runtime/results/measures.py, shapes.py). Extremes lie between solved times: where a rate
    changes its sign, the motion is followed from the solved time beside it by the emitted solver. */
+
+import { player } from './player.js';
+import { symbolNodes, units } from './units.js';
+import { stage } from './stage.js';
+import { named } from './columns.js';
+import { cell, rowFinder, tableOf, wide } from './tables.js';
+import { live } from './live.js';
+import { settings } from './settings.js';
 
 const STILL = 1e-11;  // movement, relative to the largest number of its unit, that is a rounding error
 const AT_REST = 1e-10;  // rate, relative to the largest, that is zero
@@ -254,7 +261,7 @@ function measuresOf(motion) {
     .map(output => output.measures());
 }
 
-function shortNumber(value) {
+export function shortNumber(value) {
   if (Math.abs(value) === Infinity) return value > 0 ? '∞' : '−∞';
   return Number.isFinite(value) ? `${+value.toPrecision(6)}` : '–';
 }
@@ -290,7 +297,7 @@ const PATH_MEASURES = [
   ['its centre', item => item.centre.map(shortNumber).join(', ')],
 ];
 
-function equalParts(first, last, count) {
+export function equalParts(first, last, count) {
   return [...Array(count + 1).keys()].map(k => first + k / count * (last - first));
 }
 
@@ -345,7 +352,7 @@ const GRASHOF = [
   ['p + q − s − l', ({ margin }) => shortNumber(margin)], ['turns wholly', ({ full }) => full.join(', ') || '–'],
 ];
 
-const measures = {
+export const measures = {
   solved: null,  // the motion whose measures are shown
   within: 0.01,  // part of its stroke by which an output at rest may be off
   part: [0, 1],  // of the motion, where paths are compared

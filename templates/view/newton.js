@@ -1,8 +1,7 @@
-'use strict';
 /* Newton's method for Phi(q, t) = 0 step by step, by the plain attempt of the emitted solver, and what
    is to be said of it. No document here, so that node can test it. */
 
-const newton = (() => {
+export const newton = (() => {
   const MOST_NAMES = 6;  // in a statement
   const SAME_POSITION = 1e-6;  // relative to the scale of a coordinate
   const STATUSES = ['converged', 'not converged', 'singular', 'not finite'];

@@ -1,5 +1,12 @@
-'use strict';
 /* The panel on which Newton's method is stepped through, from a guess of the user's. */
+
+import { player } from './player.js';
+import { placeAnywhere } from '#world';
+import { hasBodies } from './stage.js';
+import { newton } from './newton.js';
+import { newtonTables } from './newton_tables.js';
+import { NewtonStage } from './newton_stage.js';
+import { live } from './live.js';
 
 const MOST_ENTRIES = 60;  // coordinates up to which every entry of Phi_q is shown
 const PAUSE = 700;  // milliseconds between the steps of a run
@@ -43,9 +50,8 @@ class NewtonPanel {
     this.cells = newtonTables.jacobian(this.part('.jacobian'), model, (i, j) => this.entry(i, j));
     this.rows = newtonTables.coordinates(this.part('.coordinates'), model,
       (k, value) => this.start(this.guess.map((x, j) => (j === k ? value : x))));
-    const hasBodies = player.data.drawing.bodies.length > 0;
-    this.part('.hint').hidden = !hasBodies;
-    if (hasBodies) this.stage = new NewtonStage(() => this.isShown, guess => this.start(guess));
+    this.part('.hint').hidden = !hasBodies();
+    if (hasBodies()) this.stage = new NewtonStage(() => this.isShown, guess => this.start(guess));
     this.listen();
     this.start(player.data.guess);
   }
@@ -163,7 +169,7 @@ class NewtonPanel {
 }
 
 /* Fill the panel; without emitted functions it says why there are none. */
-function newtonPanel(root) {
+export function newtonPanel(root) {
   root.classList.add('newton');
   const count = player.data.coordinates.length;
   if (emitted.Phi && count <= MOST_ENTRIES) return new NewtonPanel(root, emitted);

@@ -1,8 +1,13 @@
-'use strict';
 /* Newton's iterates as ghosts on the stage, and a guess that can be dragged.
 
    Every body of the guess has a handle: drag the body to move it, its knob to turn it; with the
    keyboard the arrows move it and + and - turn it. */
+
+import { player } from './player.js';
+import { drawShapes, hullOf, towards } from './draw.js';
+import { AXES, inWorld, isSpatial, knobOf, moveBody } from '#world';
+import { stage } from './stage.js';
+import { setAttributes, svgElement } from './elements.js';
 
 const KNOB = 40;  // pixels from a body's origin to the knob that turns it
 const STEP = 1 / 60;  // of the picture's width that an arrow key moves a body; a tenth with Shift
@@ -10,18 +15,7 @@ const TURN = Math.PI / 36;
 const MARGIN = 5;  // sizes of a mark that are seen around the origin of a body
 const FARTHEST = 1;  // widths of the motion's picture that a body may be off its edge and be shown
 
-function svgElement(tag, attributes, text = '') {
-  const made = document.createElementNS('http://www.w3.org/2000/svg', tag);
-  setAttributes(made, attributes);
-  made.textContent = text;
-  return made;
-}
-
-function setAttributes(element, attributes) {
-  Object.entries(attributes).forEach(([name, value]) => element.setAttribute(name, value));
-}
-
-class NewtonStage {
+export class NewtonStage {
   /* isShown(): whether ghosts are to be seen now.  onGuess(q): the guess was changed. */
   constructor(isShown, onGuess) {
     this.isShown = isShown;

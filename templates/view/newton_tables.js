@@ -1,7 +1,10 @@
-'use strict';
 /* What Newton's iterates say in numbers: convergence, residuals, coordinates and Phi_q. */
 
-const newtonTables = (() => {
+import { svgElement } from './elements.js';
+import { cell, numberText, tableOf } from './tables.js';
+import { newton } from './newton.js';
+
+export const newtonTables = (() => {
   const PLOT = { width: 340, height: 200, left: 34, right: 10, top: 10, bottom: 26 };
   const LOWEST = -17;  // log10 of the smallest number that differs from zero
   const HIGHEST = 308;  // and of the largest one

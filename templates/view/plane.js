@@ -1,8 +1,14 @@
-'use strict';
 /* The plane: where points are in the world and on the screen, and how marks are drawn there. */
 
-const isSpatial = false;
-const AXES = ['x', 'y'];
+import { player } from './player.js';
+import { multiples, stepText, units } from './units.js';
+import { DASHES, distanceBetween, hullOf, isGround, MOST_PIECES, ownerOf, towards } from './draw.js';
+import { stage } from './stage.js';
+import { tipLine, tipTitle } from './tip.js';
+
+export const isSpatial = false;
+export const AXES = ['x', 'y'];
+export const orbit = null;  // of space: what turns the drawing
 const TRUE_SIZES = new Set(['wheel', 'ring', 'rack']);  // teeth of gears are as far apart as those of racks
 
 /* The angle of a frame. */
@@ -12,7 +18,7 @@ function angleOf(q, { columns: [, , phi] }) {
 
 /* World to screen: lengths are true, and the whole extent fits, unless a camera { zoom, centre } says
    what is looked at. */
-class View {
+export class View {
   constructor([left, right, low, high], width, height, margin, camera = null) {
     this.fit = Math.min((width - 2 * margin) / (right - left), (height - 2 * margin) / (high - low));
     this.scale = this.fit * (camera ? camera.zoom : 1);
@@ -43,13 +49,13 @@ class View {
 }
 
 /* Width by height of what is seen of an extent. */
-function proportions([left, right, low, high]) {
+export function proportions([left, right, low, high]) {
   return (right - left) / (high - low);
 }
 
 /** Where a point of a frame is.
  * @param {any} q @param {any} frame @param {number[]} point */
-function inWorld(q, frame, [xi, eta]) {
+export function inWorld(q, frame, [xi, eta]) {
   if (isGround(frame)) return [xi, eta];
   const [x, y, phi] = frame.columns;
   const c = Math.cos(q[phi]), s = Math.sin(q[phi]);
@@ -57,7 +63,7 @@ function inWorld(q, frame, [xi, eta]) {
 }
 
 /* Velocity and acceleration of a point of a frame. */
-function ratesInWorld(state, frame, [xi, eta]) {
+export function ratesInWorld(state, frame, [xi, eta]) {
   if (isGround(frame)) return { velocity: [0, 0], acceleration: [0, 0] };
   const { q, q_dot, q_ddot } = state, [x, y, phi] = frame.columns;
   const c = Math.cos(q[phi]), s = Math.sin(q[phi]), w = q_dot[phi], a = q_ddot[phi];
@@ -71,7 +77,7 @@ function ratesInWorld(state, frame, [xi, eta]) {
 }
 
 /* Components of a point of the world in a frame. */
-function inFrame(q, frame, place) {
+export function inFrame(q, frame, place) {
   const [x, y] = place;
   if (isGround(frame)) return [x, y];
   const [column_x, column_y, phi] = frame.columns, [dx, dy] = [x - q[column_x], y - q[column_y]];
@@ -81,7 +87,7 @@ function inFrame(q, frame, place) {
 
 /* ---- the points of a stroke ---- */
 
-function drawMarks(pen, { marks, shapes }) {
+export function drawMarks(pen, { marks, shapes }) {
   for (const mark of marks) for (const stroke of shapes[mark.shape]) drawStroke(pen, mark, stroke);
 }
 
@@ -96,7 +102,7 @@ function drawStroke(pen, mark, stroke) {
 }
 
 /* The points of a stroke on the screen; null interrupts a line. */
-function pointsOfStroke(pen, mark, stroke) {
+export function pointsOfStroke(pen, mark, stroke) {
   const size = TRUE_SIZES.has(mark.shape) ? pen.size : pen.unit / pen.view.scale;
   if (!stroke.corners.length) return curveOf(pen, mark, stroke, size);
   const axes = axesOf(pen.q, mark, stroke.on);
@@ -196,7 +202,7 @@ function around(pen, { corners, every }, { start, along, length }, size) {
 }
 
 /* The areas that are drawn of a body. */
-function areasOf(pen, frame) {
+export function areasOf(pen, frame) {
   const { marks, shapes } = player.data.drawing;
   const own = (mark, stroke) => stroke.is_area && ownerOf(mark, stroke.on).index === frame.index;
   const isBody = mark => !['pin', 'drive', 'dot'].includes(mark.kind);
@@ -205,17 +211,17 @@ function areasOf(pen, frame) {
 }
 
 /* The frame that is held at a place, and its point there. */
-function heldAt(q, frame, place, view) {
+export function heldAt(q, frame, place, view) {
   return { frame, point: inFrame(q, frame, place) };
 }
 
 /* Frames from back to front. */
-function stacked(frames, q, view) {
+export function stacked(frames, q, view) {
   return frames;
 }
 
 /* Hulls of bodies for other numbers. */
-function hullFor(attached) {
+export function hullFor(attached) {
   return hullOf(attached.slice());
 }
 
@@ -232,7 +238,7 @@ function reachOf(mark) {
 }
 
 /* Smallest x, largest x, smallest y, largest y of all marks over positions. */
-function boxOf(marks, positions) {
+export function boxOf(marks, positions) {
   let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
   const fixed = new Map();
   for (const [frame, point, radius] of marks.flatMap(reachOf)) {
@@ -257,7 +263,7 @@ function boxOf(marks, positions) {
 
 /* ---- what is shown beside the drawing ---- */
 
-function drawGrid(pen, step) {
+export function drawGrid(pen, step) {
   const { view, palette, ctx } = pen, { width, height } = stage, unit = player.data.lengthUnit;
   const [left, low] = view.toWorld([0, height]), [right, high] = view.toWorld([width, 0]);
   const upright = multiples(step, left, right).map(x => [x, view.toScreen([x, 0])[0]]);
@@ -279,7 +285,7 @@ function drawGrid(pen, step) {
 }
 
 /* A body: its angle and how it turns. */
-function bodyTip({ name, frame }, state) {
+export function bodyTip({ name, frame }, state) {
   const [, , phi] = frame.columns, unit = player.data.coordinates[phi].unit;
   const lines = [tipLine(`φ = ${units.full(state.q[phi], unit)}`)];
   if (state.isFound && !state.pose) {
@@ -290,26 +296,26 @@ function bodyTip({ name, frame }, state) {
 }
 
 /* The knob that turns a body, from its origin on the screen: along its xi axis. */
-function knobOf(q, frame, view) {
+export function knobOf(q, frame, view) {
   const phi = angleOf(q, frame);
   return [Math.cos(phi), -Math.sin(phi)];
 }
 
 /* Move a body and turn it, counterclockwise, on the screen. */
-function moveBody(q, { columns: [x, y, phi] }, [right, up], turn, view) {
+export function moveBody(q, { columns: [x, y, phi] }, [right, up], turn, view) {
   q[x] += right;
   q[y] += up;
   q[phi] += turn;
 }
 
 /* Put a body anywhere in an extent, at any angle; `between` gives a number between two. */
-function placeAnywhere(q, { columns: [x, y, phi] }, [left, right, low, high], between) {
+export function placeAnywhere(q, { columns: [x, y, phi] }, [left, right, low, high], between) {
   q[x] = between(left, right);
   q[y] = between(low, high);
   q[phi] = between(-Math.PI, Math.PI);
 }
 
 /* Coordinates that say most of a motion: angles, then all of the bodies. */
-function liveliestOf(frames) {
+export function liveliestOf(frames) {
   return [frames.map(({ columns: [, , phi] }) => phi), frames.flatMap(frame => frame.columns)];
 }

@@ -1,5 +1,4 @@
-'use strict';
-/* The motion and its time. `player`, made in stage.js, is what the other scripts share:
+/* The motion and its time. `player` is what the other scripts share, once start.js opened the page:
 
    player.data        what the page was given, arrays decoded (rows of n numbers, one after another)
    player.state       { index, time, q, q_dot, q_ddot, isFound } that is shown now
@@ -9,7 +8,7 @@
    player.onMotion(f) f() is called when the motion was replaced: after data.arrays or the drawing's
                       numbers were changed, call player.motionChanged() */
 
-const SPEEDS = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10];
+export const SPEEDS = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10];
 const PLEASANT = 6;  // seconds that a motion takes when the page opens, about
 
 function decoded(text) {
@@ -18,12 +17,20 @@ function decoded(text) {
 }
 
 /* Data as the page was given it, its arrays as numbers. */
-function withArrays(data) {
+export function withArrays(data) {
   for (const [name, text] of Object.entries(data.arrays)) data.arrays[name] = decoded(text);
   return data;
 }
 
-class Player {
+/** What the scripts of a page share, once it is open.
+ * @type {Player} */
+export let player = null;
+
+export function share(opened) {
+  player = opened;
+}
+
+export class Player {
   constructor(data) {
     this.data = data;
     this.n = data.coordinates.length;

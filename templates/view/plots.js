@@ -1,6 +1,14 @@
-'use strict';
 /* Plots of columns over time, over an angle or another column, and paths: SVG of our own, so that what
    is shown can be saved as it is. */
+
+import { player } from './player.js';
+import { multiples, niceStep, ROUNDING_PART, stepText, symbolText, units } from './units.js';
+import { liveliestOf } from '#world';
+import { hasMotion, isProjected, stage } from './stage.js';
+import { buttonOf, byId, setAttributes, svgElement } from './elements.js';
+import { columns, failures, plottedFirst } from './columns.js';
+import { contains, findBox } from './tables.js';
+import { settings } from './settings.js';
 
 const TIME = 'time';
 const ZOOM = 0.7;  // part of the range that is left by a key press
@@ -367,16 +375,8 @@ function optionGroup(group) {
   return element;
 }
 
-function buttonOf(text, act, title = '') {
-  const button = document.createElement('button');
-  Object.assign(button, { type: 'button', textContent: text, title });
-  if (title) button.setAttribute('aria-label', title);
-  button.addEventListener('click', act);
-  return button;
-}
-
 /* Give a file to the browser, which asks the user or keeps it among the downloads. */
-function save(name, blob) {
+export function save(name, blob) {
   const link = document.createElement('a');
   Object.assign(link, { href: URL.createObjectURL(blob), download: name });
   link.click();
@@ -394,7 +394,7 @@ async function saveImage(name, text, { width, height }) {
   canvas.toBlob(blob => save(name, blob));
 }
 
-const plots = {
+export const plots = {
   list: [],
   width: 240,
   range: null,  // of the x axis that all plots but paths show; null for all

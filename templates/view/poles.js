@@ -1,7 +1,11 @@
-'use strict';
 /* Velocity poles: where two bodies have the same velocity, and the curves they run along.
 
    For r_P = r + A s the velocity is r_dot + omega k x (r_P - r), with k x (x, y) = (-y, x). */
+
+import { player } from './player.js';
+import { GROUND, isGround, Pen } from './draw.js';
+import { inFrame } from '#world';
+import { stage } from './stage.js';
 
 /* Angular velocity of a body, and the velocity that its point at the world's origin would have. */
 function spinOf(state, { columns }) {
@@ -31,7 +35,7 @@ function centrode(first, second) {
   });
 }
 
-const poles = {
+export const poles = {
   pairs: [],  // of frames whose poles are shown
   showsCentrodes: false,
   curves: new Map(),  // centrodes by the indices of their bodies

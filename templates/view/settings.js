@@ -1,4 +1,3 @@
-'use strict';
 /* Settings of the parameters beside the one that is shown, each with its motion, a colour and a name.
 
    settings.kept      those that were kept: drawn behind, in plots, paths and measures
@@ -6,11 +5,22 @@
    settings.curves    both, from back to front
    settings.as(setting, act)   what `act` gives with the numbers of a setting in place of those shown */
 
-const MOST_KEPT = 5;
-const MOST_OF_FAMILY = 9;
+import { player } from './player.js';
+import { symbolText, units } from './units.js';
+import { blended, drawShapes, Pen } from './draw.js';
+import { pathOf, stage } from './stage.js';
+import { buttonOf, byId } from './elements.js';
+import { reactions } from './forces.js';
+import { plots } from './plots.js';
+import { live, setNumbers } from './live.js';
+import { equalParts, measures } from './measures.js';
+import { shownPanel } from './tabs.js';
+
+export const MOST_KEPT = 5;
+export const MOST_OF_FAMILY = 9;
 const REST_OF_PULL = 250;  // milliseconds without a pull, after which a family is solved for
 
-const settings = {
+export const settings = {
   kept: [],
   family: [],
   choose: (k, count) => {},  // a parameter for the family, by its number

@@ -1,7 +1,17 @@
-'use strict';
 /* How the page is shown: light or dark, degrees or radians, full screen, on paper. */
 
-const showing = {
+import { player } from './player.js';
+import { units } from './units.js';
+import { paletteNow } from './draw.js';
+import { hasBodies, stage } from './stage.js';
+import { byId } from './elements.js';
+import { tools } from './tools.js';
+import { plots } from './plots.js';
+import { live } from './live.js';
+import { measures } from './measures.js';
+import { shownPanel } from './tabs.js';
+
+export const showing = {
   connect() {
     byId('theme').addEventListener('click', () => {
       document.documentElement.dataset.theme = stage.palette.isDark ? 'light' : 'dark';
@@ -18,7 +28,7 @@ const showing = {
   theme() {
     stage.palette = paletteNow();
     byId('theme').ariaPressed = String(stage.palette.isDark);
-    if (hasBodies) tools.colour();
+    if (hasBodies()) tools.colour();
     plots.redraw();
     player.refresh();
   },

@@ -1,4 +1,3 @@
-'use strict';
 /* A slider with a box beside it, for a number with a unit.
 
    new Slider(holder, id, { name, unit, low, high }, pull, done)
@@ -6,9 +5,12 @@
    show(value)   what it says
    begin(), rest()   it goes back and forth by itself, or no more */
 
+import { symbolNodes, units } from './units.js';
+import { buttonOf } from './elements.js';
+
 const SWAY = 6000;  // milliseconds from end to end and back
 
-class Slider {
+export class Slider {
   constructor(holder, id, { name, unit, low, high }, pull, done) {
     this.name = name;
     this.unit = unit;

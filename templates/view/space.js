@@ -1,12 +1,17 @@
-'use strict';
 /* Space: where points are in the world and on the screen, from where the mechanism is seen, and the
    solids that stand for bodies and joints.
 
    What a shape consists of is in the data (kincompile/view/solid_shapes.py); kincompile/view/solids.py
    evaluates the same table for figures. */
 
-const isSpatial = true;
-const AXES = ['x', 'y', 'z'];
+import { player } from './player.js';
+import { multiples, stepText, units } from './units.js';
+import { arrow, blended, DASHES, distanceBetween, hullOf, isGround, MOST_PIECES, ownerOf, SAME_POINT, towards } from './draw.js';
+import { middleOf, stage } from './stage.js';
+import { tipLine, tipTitle } from './tip.js';
+
+export const isSpatial = true;
+export const AXES = ['x', 'y', 'z'];
 const LIGHT = [-0.42, 0.55, 0.72];  // to the right, up, and towards the viewer
 const SHADES = 16;
 const PIECE = 8;  // sizes, the longest part of a solid: what is nearer is drawn later
@@ -45,13 +50,13 @@ function originOf(q, { columns: [x, y, z] }) {
 
 /** Where a point of a frame is.
  * @param {any} q @param {any} frame @param {number[]} point */
-function inWorld(q, frame, [xi, eta, zeta = 0]) {
+export function inWorld(q, frame, [xi, eta, zeta = 0]) {
   if (isGround(frame)) return [xi, eta, zeta];
   return plus(originOf(q, frame), turned(parametersOf(q, frame), [xi, eta, zeta]));
 }
 
 /* Components of a point of the world in a frame. */
-function inFrame(q, frame, place) {
+export function inFrame(q, frame, place) {
   return isGround(frame) ? place : turned(parametersOf(q, frame), minus(place, originOf(q, frame)), -1);
 }
 
@@ -66,7 +71,7 @@ function turningOf([e0, ...e], [w0, ...w]) {
 }
 
 /* Velocity and acceleration of a point of a frame. */
-function ratesInWorld(state, frame, point) {
+export function ratesInWorld(state, frame, point) {
   if (isGround(frame)) return { velocity: [0, 0, 0], acceleration: [0, 0, 0] };
   const p = parametersOf(state.q, frame), arm = turned(p, [point[0], point[1], point[2] ?? 0]);
   const omega = turningOf(p, parametersOf(state.q_dot, frame)), alpha = turningOf(p, parametersOf(state.q_ddot, frame));
@@ -78,7 +83,7 @@ function ratesInWorld(state, frame, point) {
 
 /* ---- what is looked at ---- */
 
-const orbit = {
+export const orbit = {
   azimuth: STANDARD.isometric[0],
   height: STANDARD.isometric[1],
   fitted: STANDARD.isometric,  // the direction for which all of it fits: turning does not change sizes
@@ -164,7 +169,7 @@ const orbit = {
 
 /* World to screen: at the centre lengths across the view are true, and the whole extent fits, unless a
    camera { zoom, centre } says what is looked at. */
-class View {
+export class View {
   constructor(extent, width, height, margin, camera = null) {
     const [wide, tall] = orbit.reachOf(extent), middle = middleOfExtent(extent);
     this.fit = Math.min((width / 2 - margin) / wide, (height / 2 - margin) / tall);
@@ -242,7 +247,7 @@ function spansOf({ marks, states, size }, axes) {
 }
 
 /* Width by height of what is seen of an extent. */
-function proportions(extent) {
+export function proportions(extent) {
   return 1.5;
 }
 
@@ -308,7 +313,7 @@ function besideOf(axis) {
 }
 
 /* The parts of a mark: flat pieces, balls { centre, radius } and lines { line }. */
-function partsOf(q, mark, piece, size) {
+export function partsOf(q, mark, piece, size) {
   const { on, corners, every, sides } = piece;
   if (on === 'points') {
     return wiresOf(mark.points).faces.map(({ points, normal }) => ({
@@ -347,7 +352,7 @@ function wiresOf(points) {
 /* Flat faces, each counterclockwise seen from outside, and their edges; of points on a line its ends,
    of points in a plane both sides of it. Points nearer to each other, to a line or to a plane than FLAT
    of their size are one, on it: as in kincompile/view/solids.py. */
-function wiresAround(points) {
+export function wiresAround(points) {
   const near = FLAT * Math.max(...points.map(point => distanceBetween(point, points[0])));
   const own = [...points.keys()].filter(k => !points.slice(0, k).some(other => distanceBetween(other, points[k]) <= near));
   const corners = spanningOf(points, own, near), [a, b, c] = corners;
@@ -431,7 +436,7 @@ function endsOf(points) {
 }
 
 /* Hulls of bodies for other numbers: the points that differ. */
-function hullFor(attached) {
+export function hullFor(attached) {
   const isNear = (a, b) =>
     Math.max(...a.map((x, k) => Math.abs(x - b[k]))) <= SAME_POINT * (1 + Math.max(...b.map(Math.abs)));
   return attached.filter((point, k) => !attached.slice(0, k).some(other => isNear(other, point)));
@@ -440,7 +445,7 @@ function hullFor(attached) {
 /* ---- drawing ---- */
 
 /* All parts, from back to front. */
-function drawMarks(pen, { marks, shapes }) {
+export function drawMarks(pen, { marks, shapes }) {
   const { view } = pen, size = sizeOf(pen), parts = [];
   for (const mark of marks) {
     for (const piece of shapes[mark.shape]) {
@@ -503,7 +508,7 @@ function shadeOf({ view, palette }, { line, face }, normal) {
 }
 
 /* What is seen of a body, as closed outlines on the screen: one of each mark. */
-function areasOf(pen, frame) {
+export function areasOf(pen, frame) {
   const { marks, shapes } = player.data.drawing, size = sizeOf(pen);
   const isOwn = (mark, piece) => piece.is_area && piece.on !== 'turn' && ownerOf(mark, piece.on).index === frame.index;
   return marks.filter(mark => !['drive', 'dot'].includes(mark.kind)).flatMap(mark => {
@@ -514,13 +519,13 @@ function areasOf(pen, frame) {
 }
 
 /* Bodies from back to front. */
-function stacked(frames, q, view) {
+export function stacked(frames, q, view) {
   const depth = frame => view.toScreen(inWorld(q, frame, middleOf(frame)))[2];
   return frames.toSorted((a, b) => depth(a) - depth(b));
 }
 
 /* The frame that is held at a place, and its point there: as near as the body is. */
-function heldAt(q, frame, place, view) {
+export function heldAt(q, frame, place, view) {
   const [, , depth] = view.toScreen(inWorld(q, frame, middleOf(frame)));
   return { frame, point: inFrame(q, frame, view.toWorld(view.toScreen(place), depth)) };
 }
@@ -536,7 +541,7 @@ function reachOf(mark) {
 }
 
 /* Smallest x, largest x, and so on, of all marks over positions. */
-function boxOf(marks, positions) {
+export function boxOf(marks, positions) {
   const found = [Infinity, -Infinity, Infinity, -Infinity, Infinity, -Infinity];
   for (const [frame, point] of marks.flatMap(reachOf)) {
     for (const q of isGround(frame) ? positions.slice(0, 1) : positions) {
@@ -552,7 +557,7 @@ function boxOf(marks, positions) {
 /* ---- what is shown beside the drawing ---- */
 
 /* The floor, z = 0 where the mechanism is above it or in it, else below it, and the axes of the ground. */
-function drawGrid(pen, step) {
+export function drawGrid(pen, step) {
   const { view, palette, ctx } = pen, [left, right, front, behind, low] = player.data.extent;
   const z = Math.min(0, low), xs = [Math.floor(left / step), Math.ceil(right / step)].map(k => k * step);
   const ys = [Math.floor(front / step), Math.ceil(behind / step)].map(k => k * step);
@@ -574,7 +579,7 @@ function drawGrid(pen, step) {
 }
 
 /* A body: where it is and how it turns. */
-function bodyTip({ name, frame }, state) {
+export function bodyTip({ name, frame }, state) {
   const unit = player.data.lengthUnit, p = parametersOf(state.q, frame);
   const written = (values, own) => `(${values.map(value => units.text(value, own)).join(', ')})`;
   const lines = [
@@ -593,13 +598,13 @@ function bodyTip({ name, frame }, state) {
 /* ---- the guess of Newton's method ---- */
 
 /* The knob that turns a body, from its origin on the screen: to where its xi axis points. */
-function knobOf(q, frame, view) {
+export function knobOf(q, frame, view) {
   const [from, to] = [[0, 0, 0], [1, 0, 0]].map(point => view.toScreen(inWorld(q, frame, point)));
   return towards(from, to);
 }
 
 /* Move a body across the view and turn it about the direction of the view. */
-function moveBody(q, frame, [right, up], turn, view) {
+export function moveBody(q, frame, [right, up], turn, view) {
   const way = view.way(right, up), [e0, ...e] = parametersOf(q, frame);
   const c = Math.cos(turn / 2), axis = view.back.map(x => Math.sin(turn / 2) * x);
   const p = [c * e0 - product(axis, e), ...plus(plus(e.map(x => c * x), axis, e0), cross(axis, e))];
@@ -607,13 +612,13 @@ function moveBody(q, frame, [right, up], turn, view) {
 }
 
 /* Put a body anywhere in an extent, in any orientation; `between` gives a number between two. */
-function placeAnywhere(q, { columns }, extent, between) {
+export function placeAnywhere(q, { columns }, extent, between) {
   const p = unitOf([0, 0, 0, 0].map(() => between(-1, 1) + between(-1, 1) + between(-1, 1)));
   [0, 1, 2].forEach(k => { q[columns[k]] = between(extent[2 * k], extent[2 * k + 1]); });
   p.forEach((value, k) => { q[columns[3 + k]] = value; });
 }
 
 /* Coordinates that say most of a motion: places, then all of the bodies. */
-function liveliestOf(frames) {
+export function liveliestOf(frames) {
   return [frames.flatMap(({ columns }) => columns.slice(0, 3)), frames.flatMap(({ columns }) => columns)];
 }

@@ -1,4 +1,3 @@
-'use strict';
 /* The canvas: what is drawn on it, and what a pointer does there.
 
    stage.view            world to screen, for the size the canvas has now
@@ -12,8 +11,12 @@
    stage.points          what can be pointed at: named points, joints and the origins of bodies
    stage.forget()        the motion is another one */
 
-const NEAR = 16;  // pixels within which a point is meant, twice that with a finger
-const ORIGIN = 'origin of the body';
+import { player, Player, share, withArrays } from './player.js';
+import { arrow, distanceBetween, drawShapes, paletteNow, Pen, towards } from './draw.js';
+import { areasOf, AXES, inWorld, isSpatial, orbit, proportions, ratesInWorld, stacked, View } from '#world';
+
+export const NEAR = 16;  // pixels within which a point is meant, twice that with a finger
+export const ORIGIN = 'origin of the body';
 const PLACES = 1000;  // points of a traced path
 const DOTS = 24;  // equal times that are marked on it
 const APART = 10;  // pixels between them, on the mean
@@ -21,7 +24,7 @@ const ARROW = 0.2;  // part of the canvas that the longest velocity and accelera
 const SAME_PLACE = 0.01;  // of a mark's size: two joints on one pin have one arrow
 const CLOSEST = 200;  // largest zoom
 const UPRIGHT = 0.36;  // part of a phone's height that the drawing takes at most
-const CLICK = 4;  // pixels that a pointer may move in a click
+export const CLICK = 4;  // pixels that a pointer may move in a click
 
 class Stage {
   constructor(canvas) {
@@ -355,7 +358,7 @@ class Stage {
 }
 
 /* Whether the page is shown full screen, with large type. */
-function isProjected() {
+export function isProjected() {
   return document.documentElement.classList.contains('projected');
 }
 
@@ -365,12 +368,12 @@ function fontSize() {
 }
 
 /* A body as something that can be pointed at. */
-function bodyTarget(frame) {
+export function bodyTarget(frame) {
   return { name: player.data.drawing.bodies[frame.index], kind: 'body', frame, point: middleOf(frame), isBody: true };
 }
 
 /* A point in the middle of what is drawn of a body. */
-function middleOf(frame) {
+export function middleOf(frame) {
   const own = player.data.drawing.marks.filter(mark => mark.points && mark.frame.index === frame.index);
   const corners = own.flatMap(mark => mark.points);
   if (!corners.length) return [0, 0];
@@ -417,13 +420,17 @@ function placesOf(drawing) {
     })));
 }
 
-function hasMotion() {
+export function hasBodies() {
+  return player.data.drawing.bodies.length > 0;
+}
+
+export function hasMotion() {
   return player.data.status.some(status => status === 0);
 }
 
 /* Where a point is: a line through at most PLACES solved times, interrupted where it is not known, and
    dots at equal times. */
-function pathOf(point) {
+export function pathOf(point) {
   const count = Math.min(player.count, PLACES);
   const line = Array.from({ length: count }, (_, k) => {
     const state = player.states[Math.round(k * (player.count - 1) / Math.max(count - 1, 1))];
@@ -479,5 +486,12 @@ function violatedJoints() {
   return new Set(broken.map(joint => joint.name));
 }
 
-const player = new Player(withArrays(JSON.parse(document.getElementById('data').textContent)));
-const stage = new Stage(document.getElementById('canvas'));
+/** The stage of the page, once it is open.
+ * @type {Stage} */
+export let stage = null;
+
+/* Open a page: its data, arrays still as text, and its canvas. */
+export function openPage(data, canvas) {
+  share(new Player(withArrays(data)));
+  stage = new Stage(canvas);
+}

@@ -1,10 +1,27 @@
-'use strict';
 /* Everything is connected here: controls, keys, tabs, messages, themes. */
 
-/** The element of a name in page.html, of whatever kind.
- * @param {string} id @returns {any} */
-const byId = id => document.getElementById(id);
-const hasBodies = player.data.drawing.bodies.length > 0;
+import { player, SPEEDS } from './player.js';
+import { units } from './units.js';
+import { distanceBetween, isGround } from './draw.js';
+import { isSpatial, orbit } from '#world';
+import { hasBodies, hasMotion, openPage, ORIGIN, pathOf, stage } from './stage.js';
+import { byId } from './elements.js';
+import { poles } from './poles.js';
+import { reactions } from './forces.js';
+import { tools } from './tools.js';
+import { showTip } from './tip.js';
+import { columns, failures } from './columns.js';
+import { plots } from './plots.js';
+import { numbers, points } from './tables.js';
+import { showing } from './showing.js';
+import { newtonPanel } from './newton_panel.js';
+import { live, splitSentence } from './live.js';
+import { settings } from './settings.js';
+import { taken } from './taken.js';
+import { measures } from './measures.js';
+import { Grab } from './grab.js';
+import { transmission } from './transmission_panel.js';
+import { connectTabs, shownPanel, showPanel } from './tabs.js';
 
 /* ---- what the solver says ---- */
 
@@ -17,7 +34,7 @@ function showSizes() {
     counted(data.equations.length, 'equation', 'equations'),
     counted(player.count, 'time', 'times'),
   ];
-  byId('summary').textContent = (hasBodies ? sizes : sizes.slice(1)).join(', ');
+  byId('summary').textContent = (hasBodies() ? sizes : sizes.slice(1)).join(', ');
 }
 
 function inShort({ kind, t, bodies }) {
@@ -116,9 +133,9 @@ const KEYS = {
   '-': () => player.faster(-1),
   f: () => showing.project(),
   d: () => byId('angles').click(),
-  n: () => hasBodies && byId('names').click(),
-  g: () => hasBodies && byId('grid').click(),
-  m: () => hasBodies && byId('measure').click(),
+  n: () => hasBodies() && byId('names').click(),
+  g: () => hasBodies() && byId('grid').click(),
+  m: () => hasBodies() && byId('measure').click(),
   0: () => stage.fit(),
   PageUp: () => stage.zoom(1.25),
   PageDown: () => stage.zoom(0.8),
@@ -146,7 +163,7 @@ function connectKeys() {
   });
 }
 
-/* ---- paths and tabs ---- */
+/* ---- paths ---- */
 
 /* Where the model names no point, the longest path is traced from the start: not of a body that is hung on the ground, nor of a pin
    of one, where there are others, since these go in circles. */
@@ -166,47 +183,10 @@ function traceLongest() {
   if (longest > player.data.drawing.size) stage.traced.add(candidates[lengths.indexOf(longest)]);
 }
 
-const panels = {
-  plots: () => plots.show(),
-  numbers: () => numbers.update(player.state),
-  points: () => points.update(player.state),
-  measures: () => measures.show(),
-  transmission: () => transmission.isOpen && transmission.show(),
-  newton: () => {},  // follows the player by itself
-};
-let shownPanel = 'plots';
-
-function showPanel(name) {
-  shownPanel = name;
-  for (const other of Object.keys(panels)) {
-    byId(`panel-${other}`).hidden = other !== name;
-    byId(`tab-${other}`).setAttribute('aria-selected', String(other === name));
-    byId(`tab-${other}`).tabIndex = other === name ? 0 : -1;
-  }
-  // A pose is shown beside its panel only, as are Newton's iterates.
-  if (player.state.pose && name !== 'transmission') player.setIndex(player.state.index);
-  panels[name]();
-  player.refresh();
-}
-
-function connectTabs() {
-  const names = Object.keys(panels).filter(name => !byId(`tab-${name}`).hidden);
-  names.forEach((name, k) => {
-    byId(`tab-${name}`).addEventListener('click', () => showPanel(name));
-    byId(`tab-${name}`).addEventListener('keydown', event => {
-      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-      if (!step) return;
-      const next = names[(k + step + names.length) % names.length];
-      showPanel(next);
-      byId(`tab-${next}`).focus();
-    });
-  });
-}
-
 /* ---- start ---- */
 
 function showState(state) {
-  if (hasBodies) {
+  if (hasBodies()) {
     stage.draw(state);
     showTip(state);
     tools.show(state);
@@ -219,12 +199,12 @@ function showState(state) {
 }
 
 function start() {
-  byId('stage').hidden = !hasBodies;
-  byId('plain').hidden = hasBodies;
-  byId('pointing').hidden = !hasBodies;
-  byId('tab-points').hidden = !hasBodies;
-  byId('tools').hidden = !hasBodies;
-  byId('legend').hidden = !hasBodies;
+  byId('stage').hidden = !hasBodies();
+  byId('plain').hidden = hasBodies();
+  byId('pointing').hidden = !hasBodies();
+  byId('tab-points').hidden = !hasBodies();
+  byId('tools').hidden = !hasBodies();
+  byId('legend').hidden = !hasBodies();
   showSizes();
   showVerdict();
   markTimeline();
@@ -236,7 +216,7 @@ function start() {
   byId('tab-measures').hidden = !(player.data.outputs.length || player.data.drawing.four_bars.length) || 'reason' in emitted;
   measures.build(byId('panel-measures'));
   live.build(byId('live'));
-  if (hasBodies) {
+  if (hasBodies()) {
     points.build(byId('panel-points'));
     stage.pointer = new Grab();
     stage.listen();
@@ -275,4 +255,5 @@ function forget() {
   if (shownPanel === 'measures') measures.show();
 }
 
+openPage(JSON.parse(byId('data').textContent), byId('canvas'));
 start();

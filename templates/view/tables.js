@@ -1,27 +1,32 @@
-'use strict';
 /* The numbers of the current time, and the points that can be traced. */
 
-function numberText(value) {
+import { player } from './player.js';
+import { symbolNodes, symbolText, units } from './units.js';
+import { AXES, ratesInWorld } from '#world';
+import { hasMotion, stage } from './stage.js';
+import { columns, finite } from './columns.js';
+
+export function numberText(value) {
   if (!Number.isFinite(value)) return '–';
   const size = Math.abs(value);
   if (size !== 0 && (size < 1e-4 || size >= 1e7)) return value.toExponential(5);
   return value.toPrecision(7);
 }
 
-function cell(text, tag = 'td') {
+export function cell(text, tag = 'td') {
   const element = document.createElement(tag);
   element.textContent = text;
   return element;
 }
 
-function tableOf(header) {
+export function tableOf(header) {
   const table = document.createElement('table');
   table.createTHead().insertRow().append(...header.map(text => cell(text, 'th')));
   table.createTBody();
   return table;
 }
 
-function wide(table) {
+export function wide(table) {
   const holder = document.createElement('div');
   Object.assign(holder, { className: 'wide', tabIndex: 0 });
   holder.append(table);
@@ -38,12 +43,12 @@ function nameCell(name) {
 
 const MANY = 12;  // entries of a list, above which it can be searched
 
-function contains(text, part) {
+export function contains(text, part) {
   return text.toLowerCase().includes(part.trim().toLowerCase());
 }
 
 /* A box to search a long list with; `count` says how long it is, `act` takes the text. */
-function findBox(name, count, act) {
+export function findBox(name, count, act) {
   const box = document.createElement('input');
   Object.assign(box, { type: 'search', placeholder: 'Find …', ariaLabel: name, hidden: count() <= MANY });
   box.addEventListener('input', () => act(box.value));
@@ -51,13 +56,13 @@ function findBox(name, count, act) {
 }
 
 /* A box that hides the rows of a list, [text, element], that do not have its text. */
-function rowFinder(name, rows) {
+export function rowFinder(name, rows) {
   return findBox(name, () => rows().length, part => {
     for (const [text, element] of rows()) element.hidden = !contains(text, part);
   });
 }
 
-const numbers = {
+export const numbers = {
   build(panel) {
     const bar = document.createElement('div');
     bar.className = 'bar';
@@ -147,7 +152,7 @@ function residualAt(state, k) {
 }
 
 /* Copy text; pages opened from a file may have to do it the old way. */
-async function copied(text) {
+export async function copied(text) {
   try {
     await navigator.clipboard.writeText(text);
     return true;
@@ -162,7 +167,7 @@ async function copied(text) {
   }
 }
 
-const points = {
+export const points = {
   build(panel) {
     const unit = player.data.lengthUnit;
     const titles = [...AXES.map(axis => `${axis} [${unit}]`), `|v| [${unit}/s]`, `|a| [${unit}/s²]`];

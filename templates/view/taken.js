@@ -1,5 +1,15 @@
-'use strict';
 /* What is taken along from the page: pictures of the drawing, numbers, the changed model, an address of all that is shown. */
+
+import { player, SPEEDS } from './player.js';
+import { units } from './units.js';
+import { AXES, isSpatial, orbit } from '#world';
+import { hasBodies, stage } from './stage.js';
+import { buttonOf, byId, svgElement } from './elements.js';
+import { columns } from './columns.js';
+import { plots, save } from './plots.js';
+import { live } from './live.js';
+import { MOST_KEPT, MOST_OF_FAMILY, settings } from './settings.js';
+import { shownPanel, showPanel } from './tabs.js';
 
 const LONGEST_FILM = 30;  // seconds of a film at the most
 const FILM_RATE = 30;  // pictures a second
@@ -80,7 +90,7 @@ function fileOf(kind) {
   return `${player.data.name.replace(/[^\w.-]+/g, '_')}.${kind}`;
 }
 
-const taken = {
+export const taken = {
   kinds: {
     PNG: () => stage.canvas.toBlob(blob => save(fileOf('png'), blob)),
     SVG: () => save(fileOf('svg'), new Blob([taken.svg()], { type: 'image/svg+xml' })),
@@ -91,7 +101,7 @@ const taken = {
 
   build() {
     const menu = byId('taken'), holder = menu.querySelector('div');
-    const isOffered = { PNG: hasBodies, SVG: hasBodies, WebM: hasBodies && 'MediaRecorder' in window, TOML: Boolean(player.data.toml), CSV: true };
+    const isOffered = { PNG: hasBodies(), SVG: hasBodies(), WebM: hasBodies() && 'MediaRecorder' in window, TOML: Boolean(player.data.toml), CSV: true };
     for (const [kind, act] of Object.entries(this.kinds)) {
       if (!isOffered[kind]) continue;
       const button = buttonOf(kind, () => {

@@ -1,7 +1,13 @@
-'use strict';
 /* The tip beside the point or body under the pointer. */
 
-function showTip(state) {
+import { player } from './player.js';
+import { units } from './units.js';
+import { AXES, bodyTip, ratesInWorld } from '#world';
+import { stage } from './stage.js';
+import { byId } from './elements.js';
+import { reactions } from './forces.js';
+
+export function showTip(state) {
   const tip = byId('tip'), target = stage.hovered || stage.selected;
   tip.hidden = !target;
   if (!target) return;
@@ -12,13 +18,13 @@ function showTip(state) {
   tip.style.top = `${top}px`;
 }
 
-function tipLine(text, className = '') {
+export function tipLine(text, className = '') {
   const line = document.createElement('div');
   Object.assign(line, { className, textContent: text });
   return line;
 }
 
-function tipTitle(text) {
+export function tipTitle(text) {
   const title = document.createElement('strong');
   title.textContent = text;
   return title;

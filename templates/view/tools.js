@@ -1,28 +1,16 @@
-'use strict';
 /* What helps to read the drawing: grid and scale, distances and angles, what is looked at. */
 
+import { player } from './player.js';
+import { niceStep, stepText, units } from './units.js';
+import { distanceBetween, GROUND, Pen } from './draw.js';
+import { AXES, drawGrid, inWorld, isSpatial } from '#world';
+import { bodyTarget, NEAR, stage } from './stage.js';
+import { byId } from './elements.js';
+import { poles } from './poles.js';
+import { reactions } from './forces.js';
+import { rowFinder } from './tables.js';
+
 const GRID = 70;  // pixels between lines of the grid, about
-const STEPS = [1, 2, 5, 10];
-
-/* The step 1, 2 or 5 times a power of ten that is next to a length. */
-function niceStep(length) {
-  const power = 10 ** Math.floor(Math.log10(length));
-  return power * STEPS.find(step => step * power >= 0.999 * length);
-}
-
-/* Multiples of a step between two numbers. */
-function multiples(step, low, high) {
-  const first = Math.ceil(low / step - 1e-9), count = Math.floor(high / step + 1e-9) - first + 1;
-  return Array.from({ length: Math.max(0, count) }, (_, k) => (first + k) * step);
-}
-
-/* A multiple of a step, without the digits that its rounding adds. */
-function stepText(value, step) {
-  const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-  const size = Math.abs(value);
-  if (size !== 0 && (size < 1e-4 || size >= 1e6)) return value.toExponential(1);
-  return (size < step / 2 ? 0 : value).toFixed(Math.min(12, decimals));
-}
 
 const grid = {
   isShown: false,
@@ -112,7 +100,7 @@ function mixed([x0, y0], [x1, y1], part) {
 
 /* ---- buttons and choices ---- */
 
-const tools = {
+export const tools = {
   build() {
     const pressed = (id, toggle) => {
       const button = byId(id);

@@ -1,15 +1,16 @@
-'use strict';
 /* The mechanism as a function of its inputs: `transmitted`, the emitted function, asked for poses.
 
    A pose is { u, q, x, J, all, status, last }: inputs, the coordinates that the function solves for, outputs and their derivatives by
    the inputs, all coordinates, what became of it, and the last inputs that were reached on the way to it: those of q. */
+
+import { player } from './player.js';
 
 const LED = 16;  // steps in which other parameters are led to
 const AGAIN = 1e-3;  // part of a way that is followed again from its end
 const NO_END = 4;  // sizes of the mechanism that a length is followed; an angle for a turn
 
 /* The poses on one branch, with parameters: that of the first pose. */
-class Branch {
+export class Branch {
   constructor(p) {
     this.p = p;
     this.size = transmitted.start().size;

@@ -1,9 +1,10 @@
-'use strict';
 /* Which inputs can be reached, of one or two, and where singular positions are among them; more inputs are held.
 
    Poses are found from neighbour to neighbour on a lattice of inputs that has the first pose as a point: all are on its branch. Where
    a way from one that was reached ends, the branch does, at an output singularity (type 2); where det J changes its sign there is an
    input singularity (type 1), which is looked for between the two. */
+
+import { player } from './player.js';
 
 const COARSE = 12;  // steps of a first lattice, which finds how far two inputs go
 const FINEST = 36;  // steps of that which is shown
@@ -11,7 +12,7 @@ const FINEST_AXIS = 120;  // and of that of a single input
 const MOST_POSES = 6000;  // that are tried on a lattice
 const SLICE = 12;  // milliseconds that the search takes at a time
 
-class InputMap {
+export class InputMap {
   constructor(branch, home) {
     this.branch = branch;
     this.home = home;
@@ -173,7 +174,7 @@ class InputMap {
   }
 }
 
-function isReached(pose) {
+export function isReached(pose) {
   return pose.status === 0;
 }
 

@@ -1,6 +1,16 @@
-'use strict';
 /* The panel of a transmission: inputs as sliders, outputs, J and mechanical advantage, and a map of the inputs with the
    singular positions in it. The drawing shows the pose of the inputs while the panel is open and time rests. */
+
+import { player } from './player.js';
+import { multiples, niceStep, ROUNDING_PART, stepText, units } from './units.js';
+import { isSpatial, orbit } from '#world';
+import { byId, setAttributes, svgElement } from './elements.js';
+import { cell, numberText, tableOf } from './tables.js';
+import { Slider } from './sliders.js';
+import { live } from './live.js';
+import { shortNumber } from './measures.js';
+import { Branch } from './transmission.js';
+import { InputMap, isReached } from './transmission_map.js';
 
 const CHART = { width: 340, height: 250, left: 46, right: 10, top: 10, low: 36 };
 const MOST_MAPPED = 3;  // inputs that have a map: of three a slice, the last one held
@@ -33,7 +43,7 @@ function quotientText(text, above, below) {
   return `${text} ${below ? `${above || 1}/${below}` : above}`;
 }
 
-const transmission = {
+export const transmission = {
   panel: null,
   map: null,  // of the parameters as they are, when it is found
   pose: null,  // the last that was reached

@@ -1,4 +1,3 @@
-'use strict';
 /* Numbers as they are read: angles in radians or degrees, as many digits as are significant.
 
    units.text(value, unit)   a number of a unit of the model; rounding errors of the largest number
@@ -6,10 +5,13 @@
    units.name(unit)          the unit it is shown in
    units.factor(unit)        and the factor from one to the other */
 
-const DIGITS = 6;  // of the largest number of a unit; the others have as many decimals
-const ROUNDING_PART = 1e-11;  // of the largest number, below which a difference is rounding
+import { player } from './player.js';
 
-const units = {
+const DIGITS = 6;  // of the largest number of a unit; the others have as many decimals
+export const ROUNDING_PART = 1e-11;  // of the largest number, below which a difference is rounding
+export const LARGEST = 1e300;  // number whose differences are finite too
+
+export const units = {
   angle: 'rad',
   scales: null,  // of each unit: the largest number of the motion
 
@@ -74,6 +76,30 @@ function largestOfUnits({ coordinates, outputs, arrays, lengthUnit, drawing }) {
   return scales;
 }
 
+/* ---- steps of a scale ---- */
+
+const STEPS = [1, 2, 5, 10];
+
+/* The step 1, 2 or 5 times a power of ten that is next to a length. */
+export function niceStep(length) {
+  const power = 10 ** Math.floor(Math.log10(length));
+  return power * STEPS.find(step => step * power >= 0.999 * length);
+}
+
+/* Multiples of a step between two numbers. */
+export function multiples(step, low, high) {
+  const first = Math.ceil(low / step - 1e-9), count = Math.floor(high / step + 1e-9) - first + 1;
+  return Array.from({ length: Math.max(0, count) }, (_, k) => (first + k) * step);
+}
+
+/* A multiple of a step, without the digits that its rounding adds. */
+export function stepText(value, step) {
+  const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 1e-4 || size >= 1e6)) return value.toExponential(1);
+  return (size < step / 2 ? 0 : value).toFixed(Math.min(12, decimals));
+}
+
 /* ---- names as derivations print them ---- */
 
 const LETTERS = 'alpha α beta β gamma γ delta δ epsilon ε zeta ζ eta η theta θ iota ι kappa κ lambda λ mu μ nu ν xi ξ rho ρ sigma σ tau τ phi φ chi χ psi ψ omega ω'.split(' ');
@@ -86,12 +112,12 @@ function symbolOf(name, order = 0) {
   return { letter: isLetter ? letter + ['', '\u0307', '\u0308'][order] : ['', 'd/dt ', 'd²/dt² '][order] + letter, index };
 }
 
-function symbolText(name, order = 0) {
+export function symbolText(name, order = 0) {
   const { letter, index } = symbolOf(name, order);
   return index ? `${letter}_${index}` : letter;
 }
 
-function symbolNodes(name) {
+export function symbolNodes(name) {
   const { letter, index } = symbolOf(name), [base, low] = ['span', 'sub'].map(tag => document.createElement(tag));
   [base.textContent, low.textContent] = [letter, index];
   if ([...letter].length === 1) base.style.fontStyle = 'italic';

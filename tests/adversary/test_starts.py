@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.report.templates import read
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.problem import iterate, problem
 from kincompile.view.page_scripts import solver_script
@@ -27,6 +26,7 @@ from tests.adversary.chains import (
     reach,
 )
 from tests.adversary.test_chains import Case, chain_of, start_of
+from tests.page_modules import in_node
 from tests.targets.conftest import OCTAVE, run_octave
 
 STRUCTURES = (("RRR",), ("RRP", "slot"), ("RRR", "gear", "RRR"), ("slot", "RRR", "RRP"))
@@ -204,16 +204,15 @@ def test_that_many_chains_end_alike_in_javascript(tmp_path):
 
 @needs_node
 @pytest.mark.slow
-def test_two_hundred_bad_starts_on_the_page(tmp_path, record):
+def test_two_hundred_bad_starts_on_the_page(record):
     """Newton's panel takes the plain iterates, and so they are compared."""
     tried, thrown = 0, 0
     statuses = {"converged": 0, "singular": 2, "not finite": 3, "not converged": 1}
     for case, random in cases():
         module, guesses = kc.compile(case.model), bad_starts(case, random, 50)
-        text = solver_script(case.model) + "\n" + read("view/newton.js")
-        starts = json.dumps(guesses.tolist())
-        result = f"{starts}.map(g => newton.iterate(emitted, g, 0))"
-        for guess, found in zip(guesses, under_node(tmp_path, text, result), strict=True):
+        text = solver_script(case.model) + "import { newton } from './newton.js';\n"
+        text += "tell(given.map(guess => newton.iterate(emitted, guess, 0)));"
+        for guess, found in zip(guesses, in_node(text, guesses.tolist()), strict=True):
             known = iterate(
                 problem(code_of(module), module.DEFAULTS, guess, 0.0), 0.0, guess, 1e-10, 25
             )

@@ -1,27 +1,25 @@
 """The drawing of a page for other parameters, in node: any values, then the first ones again."""
 
 import json
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
 
 import kincompile as kc
 from kincompile.model.mechanism import system_of
-from kincompile.report.templates import read
 from kincompile.view.drawing import drawing
-from kincompile.view.page_scripts import WORLDS, geometry_script, solver_script
+from kincompile.view.page_scripts import geometry_script, solver_script
 from kincompile.view.worlds import PLANE, SPACE
 from tests.conftest import EXAMPLES, load_example
+from tests.page_modules import in_node
 
-NODE = shutil.which("node") or shutil.which("nodejs")
 IN_SPACE = sorted((EXAMPLES[0].parent / "space").glob("*.py"))
 
 PROGRAM = """
+import { setNumbers } from './live.js';
 const written = drawing => JSON.stringify(drawing.marks);
-console.log(JSON.stringify(scenes.map(({ drawing, geometry: own, given, others }) => {
-  geometry = own;
+tell(scenes.map(({ drawing, geometry: own, given, others }) => {
+  globalThis.geometry = own;
   setNumbers(drawing, given);
   const first = written(drawing);
   return { first: JSON.parse(first), returns: others.map(values => {
@@ -30,7 +28,7 @@ console.log(JSON.stringify(scenes.map(({ drawing, geometry: own, given, others }
     setNumbers(drawing, given);
     return { there, isFirst: written(drawing) === first };
   }) };
-})));
+}));
 """
 
 
@@ -64,19 +62,7 @@ def drawn_again(models, dimension):
     """Return for each model its other values by name, and what a page makes of its drawing."""
     scenes = [scene(model) for model in models]
     text = ",\n".join(own for _, _, own in scenes)
-    program = "\n".join(
-        [
-            *(read(f"view/{name}") for name in ("draw.js", WORLDS[dimension], "live.js")),
-            "let geometry;",
-            f"const scenes = [{text}];",
-            PROGRAM,
-        ]
-    )
-    done = subprocess.run(
-        [str(NODE), "-"], input=program, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr[-2000:]
-    found = json.loads(done.stdout)
+    found = in_node(f"const scenes = [{text}];\n{PROGRAM}", dimension=dimension)
     return [
         ([dict(zip(names, values, strict=True)) for values in others], own)
         for (names, others, _), own in zip(scenes, found, strict=True)
@@ -103,7 +89,6 @@ def triangle() -> kc.Mechanism:
     return m
 
 
-@pytest.mark.skipif(NODE is None, reason="node is not installed (Debian: nodejs)")
 @pytest.mark.parametrize(
     ("dimension", "names"),
     [
@@ -122,7 +107,6 @@ def test_that_the_first_values_again_give_the_first_drawing(dimension, names):
         assert all(item["isFirst"] for item in own["returns"]), model.name
 
 
-@pytest.mark.skipif(NODE is None, reason="node is not installed (Debian: nodejs)")
 def test_that_links_have_the_corners_that_python_gives_them():
     model = triangle()
     ((others, own),) = drawn_again([model], PLANE)

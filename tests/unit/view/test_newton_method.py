@@ -1,37 +1,26 @@
 """Newton's method of the page, in node: LU against NumPy, iterates against the runtime's."""
 
 import json
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.report.templates import read
 from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.problem import iterate, problem
 from kincompile.view.page_scripts import MOST_COORDINATES, solver_script
+from tests.page_modules import in_node
 
-NODE = shutil.which("node") or shutil.which("nodejs")
 STATUSES = {
     "CONVERGED": "converged", "SINGULAR": "singular", "NOT_FINITE": "not finite",
     "NOT_CONVERGED": "not converged",
 }  # fmt: skip
 
-node = pytest.mark.skipif(NODE is None, reason="node is not installed (Debian: nodejs)")
 
-
-def run(tmp_path, script, expression):
+def run(script, expression):
     """Return what an expression of `newton` and of a script's declarations gives."""
-    text = f"{script}\n{read('view/newton.js')}\nconsole.log(JSON.stringify({expression}))"
-    (tmp_path / "all.js").write_text(text, encoding="utf-8")
-    done = subprocess.run(
-        [str(NODE), "all.js"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return in_node(f"{script}\nimport {{ newton }} from './newton.js';\ntell({expression});")
 
 
 def guesses(module):
@@ -47,36 +36,33 @@ def guesses(module):
 LINEAR = "emitted.solver.linear"
 
 
-@node
-def test_that_factors_solve_and_give_the_determinant(tmp_path):
+def test_that_factors_solve_and_give_the_determinant():
     rng = np.random.default_rng(5)
     for n in (1, 2, 5, 15):
         matrix, b = rng.normal(size=(n, n)), rng.normal(size=n)
         matrix[0, 0] = 0 if n > 1 else matrix[0, 0]
         text = f"(() => {{ const f = {LINEAR}.factor({json.dumps(matrix.tolist())});"
         text += f"return [{LINEAR}.solve(f, {json.dumps(b.tolist())}), f.determinant]; }})()"
-        x, determinant = run(tmp_path, solver_script(folded()), text)
+        x, determinant = run(solver_script(folded()), text)
         np.testing.assert_allclose(x, np.linalg.solve(matrix, b), rtol=1e-11)
         np.testing.assert_allclose(determinant, np.linalg.det(matrix), rtol=1e-12)
 
 
-@node
-def test_that_columns_that_depend_on_each_other_are_found(tmp_path):
+def test_that_columns_that_depend_on_each_other_are_found():
     matrix = np.random.default_rng(6).normal(size=(5, 5))
     matrix[:, 3] = 2 * matrix[:, 0] - matrix[:, 2]
     text = f"{LINEAR}.factor({json.dumps(matrix.tolist())})"
-    factors = run(tmp_path, solver_script(folded()), text)
+    factors = run(solver_script(folded()), text)
     assert factors["determinant"] == 0
     assert factors["dependent"] == [0, 2, 3]
 
 
-@node
 @pytest.mark.parametrize("shape", [(1, 1), (4, 4), (6, 4), (4, 5)])
-def test_that_singular_values_are_numpys(tmp_path, shape):
+def test_that_singular_values_are_numpys(shape):
     matrix = np.random.default_rng(7).normal(size=shape)
     matrix[:, 0] = matrix[:, -1]
     text = f"{LINEAR}.singularValues({json.dumps(matrix.tolist())})"
-    found = run(tmp_path, solver_script(folded()), text)[::-1]
+    found = run(solver_script(folded()), text)[::-1]
     sizes = np.zeros(shape[1])
     sizes[: min(shape)] = np.linalg.svd(matrix, compute_uv=False)
     np.testing.assert_allclose([item["size"] for item in found], sizes, atol=1e-14)
@@ -86,12 +72,11 @@ def test_that_singular_values_are_numpys(tmp_path, shape):
 
 
 @pytest.mark.every(5)
-@node
-def test_that_iterates_are_those_of_the_runtime(tmp_path, example):
+def test_that_iterates_are_those_of_the_runtime(example):
     module, t = example.module, 0.3
     starts = [guess.tolist() for guess in guesses(module)]
     text = f"{json.dumps(starts)}.map(guess => newton.iterate(emitted, guess, {t}))"
-    found = run(tmp_path, solver_script(example.model), text)
+    found = run(solver_script(example.model), text)
     for guess, attempt in zip(starts, found, strict=True):
         q = np.array(guess)
         # The page has the size of the mechanism from the model's guess.
@@ -106,12 +91,11 @@ def test_that_iterates_are_those_of_the_runtime(tmp_path, example):
             np.testing.assert_allclose(here["q"], there.q, rtol=1e-9, atol=1e-9)
 
 
-@node
-def test_that_iterates_are_those_of_the_lecture(tmp_path, example_named):
+def test_that_iterates_are_those_of_the_lecture(example_named):
     """Reference case R3, to the digits printed there."""
     example = example_named("problem_3_5_6")
     text = "newton.iterate(emitted, [0.2, 0.2, Math.PI / 4], 0).iterates"
-    found = run(tmp_path, solver_script(example.model), text)
+    found = run(solver_script(example.model), text)
     expected = [
         (0.4232233047, 0.1767766953, 0.7853981634), (0.38125, 0.1348033906, 1.0228350305),
         (0.3813100372, 0.1215644989, 1.06347535), (0.3812500401, 0.1210317905, 1.065432028),
@@ -137,20 +121,19 @@ def folded():
     return m
 
 
-def stated(tmp_path, m, guess, motion, t=0.0):
+def stated(m, guess, motion, t=0.0):
     """Return what the panel says of a run."""
     guess, motion = (json.dumps(None if q is None else list(q)) for q in (guess, motion))
     text = f"newton.statement(emitted, newton.iterate(emitted, {guess}, {t}), {t}, "
-    return run(tmp_path, solver_script(m), f"{text}emitted.DEFAULTS, {motion})")
+    return run(solver_script(m), f"{text}emitted.DEFAULTS, {motion})")
 
 
-@node
-def test_that_the_statement_names_the_branch(tmp_path):
+def test_that_the_statement_names_the_branch():
     m = folded()
     first, second = kc.assemblies(kc.compile(m))[:2]
     near = first + 0.01
-    assert stated(tmp_path, m, near, first).endswith("iterations to the position of the motion.")
-    text = stated(tmp_path, m, near, second)
+    assert stated(m, near, first).endswith("iterations to the position of the motion.")
+    text = stated(m, near, second)
     assert "to the other branch: det \u03a6_q is " in text
     assert text.endswith(
         "Other than in the motion: x_coupler, y_coupler, phi_coupler, x_rocker, y_rocker, "
@@ -159,24 +142,22 @@ def test_that_the_statement_names_the_branch(tmp_path):
     signs = np.sign(np.linalg.det(kc.compile(m).Phi_q(np.array([first, second]), 0.0)))
     words = {1.0: "positive", -1.0: "negative"}
     assert f"is {words[signs[0]]} there and {words[signs[1]]} in the motion" in text
-    assert "the motion has none at this time" in stated(tmp_path, m, near, None)
+    assert "the motion has none at this time" in stated(m, near, None)
 
 
-@node
-def test_that_the_statement_counts_whole_turns(tmp_path):
+def test_that_the_statement_counts_whole_turns():
     m = folded()
     first = kc.assemblies(kc.compile(m))[0]
     turned = first + np.eye(9)[8] * 4 * np.pi + 1e-3
-    text = stated(tmp_path, m, turned, first)
+    text = stated(m, turned, first)
     assert text.endswith(
         "to the position of the motion, turned further: phi_rocker by 2 \u00d7 2\u03c0."
     )
 
 
-@node
-def test_that_the_statement_names_dependent_columns(tmp_path):
+def test_that_the_statement_names_dependent_columns():
     m = folded()
-    text = stated(tmp_path, m, [0.0] * 9, None)
+    text = stated(m, [0.0] * 9, None)
     # On a line only the two lengths along y are determined twice; phi_crank has its driver.
     assert text.startswith("Stopped after 0 iterations: \u03a6_q is singular there, its columns ")
     assert set(text.split("columns ")[1].removesuffix(" depend on each other.").split(", ")) == {
@@ -184,29 +165,27 @@ def test_that_the_statement_names_dependent_columns(tmp_path):
     }  # fmt: skip
 
 
-@node
-def test_that_the_statement_says_where_there_is_no_convergence(tmp_path):
+def test_that_the_statement_says_where_there_is_no_convergence():
     x = sympy.Symbol("x")
     m = kc.ConstraintSystem("none", "x", [x**2 + 1])
-    assert stated(tmp_path, m, [0.3], None).startswith("No convergence in 25 iterations: ")
+    assert stated(m, [0.3], None).startswith("No convergence in 25 iterations: ")
     m = kc.ConstraintSystem("double", "x", [(x - 1) ** 2])
     for far in (0.3, 30.0):
-        text = stated(tmp_path, m, [far], None)
+        text = stated(m, [far], None)
         assert "iterations the corrections still only halve: \u03a6_q is singular" in text
         assert text.endswith("its column x vanishes.")
     m = kc.ConstraintSystem("root", "x", [sympy.sqrt(x) + 1])
-    text = stated(tmp_path, m, [0.3], None)
+    text = stated(m, [0.3], None)
     assert text == "Stopped after 0 iterations: the equations have no finite value at the next one."
 
 
-@node
-def test_that_a_lock_up_is_named(tmp_path, example_named):
+def test_that_a_lock_up_is_named(example_named):
     m = example_named("problem_3_5_6").model
     # At t = 4.5 sin(phi3) = -1: the last position, and Phi_q is singular there.
-    text = stated(tmp_path, m, [0.85, 0.0, -1.4], None, 4.5)
+    text = stated(m, [0.85, 0.0, -1.4], None, 4.5)
     assert "the corrections still only halve: \u03a6_q is singular" in text
     assert "phi3" in text
-    assert stated(tmp_path, m, [0.85, 0.0, -1.4], None, 4.6).startswith("No convergence in 25 ")
+    assert stated(m, [0.85, 0.0, -1.4], None, 4.6).startswith("No convergence in 25 ")
 
 
 def test_that_the_script_has_no_name_of_the_mechanism_outside():

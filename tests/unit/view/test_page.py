@@ -12,8 +12,8 @@ import pytest
 import kincompile as kc
 from kincompile import compiler
 from kincompile.report.templates import template_root
-from kincompile.view.page import SCRIPTS, STYLES
-from kincompile.view.page_scripts import WORLDS
+from kincompile.view.modules import WORLDS, modules_of
+from kincompile.view.page import STYLES
 
 
 def data_of(html):
@@ -203,7 +203,7 @@ def test_that_every_script_and_style_sheet_is_used():
     folder = template_root() / "view"
     here = {item.name for item in folder.iterdir() if item.name.endswith((".js", ".css"))}
     others = {"gallery.js", "gallery.css", "watch.js"}  # of other pages
-    used = {*SCRIPTS, *STYLES, *WORLDS.values()}
+    used = {*STYLES, *(name for dimension in WORLDS for name in modules_of("start.js", dimension))}
     assert here == used | others
     assert "EventSource" not in kc.page(pendulum()).html
 

@@ -1,9 +1,6 @@
 """Solids of marks in space: closed, where the page puts them, and the same in every file."""
 
 import itertools
-import json
-import shutil
-import subprocess
 from typing import Any
 from xml.etree import ElementTree as ET
 
@@ -13,22 +10,23 @@ from scipy.spatial.transform import Rotation
 
 import kincompile as kc
 from kincompile.errors import InputError
-from kincompile.report.templates import read
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import GROUND_FRAME, FramePoint, Span, Symbol
 from kincompile.view.solid_picture import Camera
 from kincompile.view.solid_shapes import SOLIDS
 from kincompile.view.solids import InFrame, Position, Solid, facets_of, solids, wires
+from tests.page_modules import in_node
 from tests.spatial_models import slider_crank
 
 SVG = "{http://www.w3.org/2000/svg}"
 CUBE = [(x, y, z) for x in (0.0, 2.0) for y in (0.0, 1.0) for z in (0.0, 3.0)]
 
 PROGRAM = """
-const { drawing, positions } = JSON.parse(require('fs').readFileSync(0, 'utf8'));
+import { partsOf } from './space.js';
+const { drawing, positions } = given;
 const partsAt = q => drawing.marks.flatMap(mark => drawing.shapes[mark.shape].map(
   piece => partsOf(q, mark, piece, drawing.size)));
-console.log(JSON.stringify(positions.map(partsAt)));
+tell(positions.map(partsAt));
 """
 
 
@@ -161,19 +159,9 @@ def faces_by_all_triples(places: np.ndarray) -> list[tuple[frozenset[int], np.nd
 
 
 HULLS = """
-const sets = JSON.parse(require('fs').readFileSync(0, 'utf8'));
-console.log(JSON.stringify(sets.map(wiresAround)));
+import { wiresAround } from './space.js';
+tell(given.map(wiresAround));
 """
-
-
-def in_node(program: str, given: Any) -> Any:
-    if shutil.which("node") is None:
-        pytest.skip("node is not installed")
-    text = read("view/draw.js") + read("view/space.js") + program
-    done = subprocess.run(
-        ["node", "-e", text], input=json.dumps(given), capture_output=True, text=True, check=True
-    )
-    return json.loads(done.stdout)
 
 
 def test_that_hulls_have_the_faces_of_their_definition_in_python_and_on_the_page():
@@ -198,16 +186,15 @@ def test_that_hulls_have_the_faces_of_their_definition_in_python_and_on_the_page
 
 
 COUNTED = """
-let count = 0;
-const random = JSON.parse(require('fs').readFileSync(0, 'utf8'));
-const distance = distanceBetween, across = beyond;
-distanceBetween = (...given) => { count += 1; return distance(...given); };
-beyond = (...given) => { count += 1; return across(...given); };
-console.log(JSON.stringify(random.map(points => {
-  count = 0;
-  wiresAround(points);
-  return count;
-})));
+import { wiresAround } from './space.js';
+let reads = 0;
+const get = (...all) => { reads += 1; return Reflect.get(...all); };
+const counted = point => new Proxy(point, { get });
+tell(given.map(points => {
+  reads = 0;
+  wiresAround(points.map(counted));
+  return reads;
+}));
 """
 
 

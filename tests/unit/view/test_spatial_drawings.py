@@ -1,24 +1,17 @@
 """Drawings in space: frames, marks, and the scripts of the page that evaluate them."""
 
-import json
-import re
-import shutil
-import subprocess
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import kincompile as kc
 from kincompile import spatial
-from kincompile.report.templates import read
 from kincompile.space.catalogue import CONSTRAINTS
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import BodyFrame, Symbol, in_ground
-from kincompile.view.page import scripts_for
-from kincompile.view.page_scripts import WORLDS
 from kincompile.view.solid_joints import DRAWINGS
 from kincompile.view.solid_shapes import SOLID_LOOKS, SOLIDS
+from tests.page_modules import in_node
 from tests.spatial_models import slider_crank
 
 FRAME = BodyFrame(0, tuple(range(7)))
@@ -28,24 +21,6 @@ FRAME = BodyFrame(0, tuple(range(7)))
 def motion():
     model = slider_crank()
     return model, kc.solve(kc.compile(model), np.linspace(0, 1, 41))
-
-
-@pytest.fixture(scope="module")
-def on_the_page():
-    """Return a function that runs a program after the scripts that draw in space."""
-    if shutil.which("node") is None:
-        pytest.skip("node is not installed")
-
-    def run(program, given):
-        text = "const given = JSON.parse(require('fs').readFileSync(0, 'utf8'));\n"
-        scripts = read("view/draw.js") + read("view/space.js") + text + program
-        done = subprocess.run(
-            ["node", "-e", scripts],
-            input=json.dumps(given), capture_output=True, text=True, check=True,
-        )  # fmt: skip
-        return json.loads(done.stdout)
-
-    return run
 
 
 def states(count, seed=3):
@@ -59,31 +34,33 @@ def test_that_a_point_of_a_body_is_where_its_rotation_puts_it():
     np.testing.assert_allclose(found, q[:, :3] + turn.apply(point), atol=1e-14)
 
 
-def test_that_the_page_puts_points_where_python_does(on_the_page):
+def test_that_the_page_puts_points_where_python_does():
     q, point = states(20), (0.3, -0.7, 1.1)
     program = """
+    import { inFrame, inWorld } from './space.js';
     const frame = { index: 0, columns: [0, 1, 2, 3, 4, 5, 6] };
     const there = given.q.map(q => inWorld(q, frame, given.point));
     const back = given.q.map((q, k) => inFrame(q, frame, there[k]));
-    console.log(JSON.stringify({ there, back }));"""
-    found = on_the_page(program, {"q": q.tolist(), "point": point})
+    tell({ there, back });"""
+    found = in_node(program, {"q": q.tolist(), "point": point})
     np.testing.assert_allclose(found["there"], in_ground(q, FRAME, point), atol=1e-14)
     np.testing.assert_allclose(found["back"], np.tile(point, (20, 1)), atol=1e-13)
 
 
-def test_that_the_page_has_the_rates_of_a_point(on_the_page, motion):
+def test_that_the_page_has_the_rates_of_a_point(motion):
     _, solution = motion
     frame = BodyFrame(1, tuple(range(7, 14)))
     program = """
+    import { ratesInWorld } from './space.js';
     const frame = { index: 1, columns: [7, 8, 9, 10, 11, 12, 13] };
     const rates = given.states.map(state => ratesInWorld(state, frame, given.point));
-    console.log(JSON.stringify(rates));"""
+    tell(rates);"""
     orders = ("q", "q_dot", "q_ddot")
     rows = [
         {order: getattr(solution, order)[k].tolist() for order in orders}
         for k in range(solution.t.size)
     ]
-    found = on_the_page(program, {"states": rows, "point": (0, 0.05, 0)})
+    found = in_node(program, {"states": rows, "point": (0, 0.05, 0)})
     for kind, rate in (("velocity", "_dot"), ("acceleration", "_ddot")):
         known = np.stack([solution[f"{axis}_tip{rate}"] for axis in "xyz"], axis=-1)
         np.testing.assert_allclose([row[kind] for row in found], known, atol=1e-12)
@@ -120,15 +97,6 @@ def test_that_a_page_in_space_is_one_small_file_and_one_of_the_plane_has_nothing
     plane = kc.Mechanism("plane")
     plane.add(kc.AbsoluteAngle("motor", plane.body("link"), kc.t))
     assert "const orbit" not in kc.page(plane).html
-
-
-def test_that_no_name_is_declared_by_two_scripts():
-    for dimension in WORLDS:
-        found = []
-        for name in scripts_for(dimension):
-            found += re.findall(r"^(?:const|let|function|class) (\w+)", read(f"view/{name}"), re.M)
-        assert len(found) > 100
-        assert sorted(found) == sorted(set(found))
 
 
 def test_that_a_body_whose_only_point_is_its_origin_is_a_stub_of_a_shaft():

@@ -1,22 +1,20 @@
 """Strokes of marks: the page's script puts every point where Python puts it."""
 
-import json
 import math
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
 
-from kincompile.report.templates import read
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import BodyFrame, Hull, Rail, Span
 from kincompile.view.polylines import of_mark, polylines
 from kincompile.view.shapes import LOOKS, SHAPES
+from tests.page_modules import in_node
 
 PROGRAM = """
-const text = require('fs').readFileSync(0, 'utf8');
-const { drawing, positions } = JSON.parse(text);
+import { fitMarks, ownerOf, Pen } from './draw.js';
+import { pointsOfStroke } from './plane.js';
+const { drawing, positions } = given;
 const pens = positions.map(q => Object.assign(Object.create(Pen.prototype), {
   q, size: drawing.size, unit: drawing.size, view: { scale: 1, toScreen: point => point },
 }));
@@ -27,25 +25,13 @@ const owners = drawing.marks.flatMap(
 for (const mark of drawing.marks) Object.assign(mark, { barrel: 0, reach: [0, 0] });
 fitMarks({ data: { drawing }, seen: positions.map(q => ({ q })) });
 const fitted = drawing.marks.map(({ barrel, reach }) => [barrel, reach]);
-console.log(JSON.stringify({ drawn, owners, fitted }));
+tell({ drawn, owners, fitted });
 """
 
 
-@pytest.fixture(scope="module")
-def in_the_page():
-    """Return a function that evaluates a drawing by the script of the page."""
-    if shutil.which("node") is None:
-        pytest.skip("node is not installed")
-
-    def evaluated(drawn, positions):
-        given = json.dumps({"drawing": drawn.to_json(), "positions": positions.tolist()})
-        program = read("view/draw.js") + read("view/plane.js") + PROGRAM
-        done = subprocess.run(
-            ["node", "-e", program], input=given, capture_output=True, text=True, check=True
-        )
-        return json.loads(done.stdout)
-
-    return evaluated
+def in_the_page(drawn, positions):
+    """Return what the page's modules make of a drawing."""
+    return in_node(PROGRAM, {"drawing": drawn.to_json(), "positions": positions.tolist()})
 
 
 def as_array(points):
@@ -53,7 +39,7 @@ def as_array(points):
 
 
 @pytest.mark.every(5)
-def test_that_the_page_draws_the_points_that_python_draws(example, in_the_page):
+def test_that_the_page_draws_the_points_that_python_draws(example):
     q = example.solution.q[example.solution.good]
     drawn = drawing(example.model, q=q)
     if not drawn.bodies:
@@ -67,7 +53,7 @@ def test_that_the_page_draws_the_points_that_python_draws(example, in_the_page):
 
 
 @pytest.mark.slow
-def test_that_rails_and_barrels_are_fitted_to_a_motion_as_python_fits_them(example, in_the_page):
+def test_that_rails_and_barrels_are_fitted_to_a_motion_as_python_fits_them(example):
     q = example.solution.q[example.solution.good]
     drawn = drawing(example.model, q=q)
     if not drawn.bodies:
