@@ -10,6 +10,7 @@ import { AXES, boxOf, hullFor } from '#world';
 import { hasMotion, stage } from './stage.js';
 import { copied, numberText } from './tables.js';
 import { Slider } from './sliders.js';
+import { History } from './history.js';
 import { settings } from './settings.js';
 import { taken } from './taken.js';
 
@@ -159,6 +160,7 @@ export const live = {
   made: null,  // what of the data depends on the motion, as the page was made
   motion: null,  // the one shown, where the page solved for it; null for the one it was made with
   isChanged: false,  // whether a slider was pulled
+  refused: '',  // why the last pull was not taken
 
   get names() {
     return player.data.parameters.map(({ name }) => name);
@@ -180,22 +182,33 @@ export const live = {
       panel.append(reason);
       return;
     }
-    const grid = document.createElement('div');
-    grid.className = 'sliders';
+    const { grid, drawn, folded, places } = this.grids();
     this.sliders = parameters.map((parameter, k) => new Slider(
-      grid, `slider-${k}`, parameter, value => this.pull(k, value), () => this.writeFragment()));
+      places.has(k) ? drawn : grid, `slider-${k}`, parameter, value => this.pull(k, value), () => this.commit()));
+    this.history = new History(() => this.values.slice(), values => this.goTo(values));
     this.verdict = document.createElement('output');
     const kept = document.createElement('div');
     Object.assign(kept, { id: 'kept', className: 'buttons', role: 'group', ariaLabel: 'Kept settings' });
-    panel.append(grid, this.buttons(), kept, this.verdict);
-    const { arrays, status, events, success, message, guessResidual } = player.data;
-    this.made = { arrays, status, events, success, message, guessResidual };
+    panel.append(grid, ...(places.size ? [folded] : []), this.buttons(), kept, this.verdict);
+    this.history.listen();
+    const { arrays, status, events, success, message, guessResidual, guess } = player.data;
+    this.made = { arrays, status, events, success, message, guessResidual, guess };
     // The first drawing has the very numbers that a Reset gives.
     setNumbers(player.data.drawing, this.given);
     this.fit();
     this.readFragment();
     setTimeout(() => this.motionNow(), WARM);  // the first pull is not the first solve: that takes longer
     addEventListener('hashchange', () => this.readFragment());
+  },
+
+  /* Where sliders are; those of the places of drawn joints, which are pulled in the drawing, are folded. */
+  grids() {
+    const places = new Set(player.data.drawing.hands.filter(hand => hand.is_drawn).flatMap(({ own }) => own));
+    const [grid, drawn] = [0, 1].map(() => Object.assign(document.createElement('div'), { className: 'sliders' }));
+    const folded = document.createElement('details'), summary = document.createElement('summary');
+    summary.textContent = 'Joints: drag their rings, or type places';
+    folded.append(summary, drawn);
+    return { grid, drawn, folded, places };
   },
 
   buttons() {
@@ -206,15 +219,25 @@ export const live = {
       Object.assign(element, { type: 'button', id, textContent: text });
       element.addEventListener('click', () => action(element));
       bar.append(element);
+      return element;
     };
     const copy = (text, label) => async element => {
       element.textContent = await copied(text()) ? 'Copied' : 'Not allowed';
       setTimeout(() => { element.textContent = label; }, 1500);
     };
+    const undo = button('undo', 'Undo', () => this.history.undo()), redo = button('redo', 'Redo', () => this.history.redo());
+    this.history.onChange = () => {
+      undo.disabled = !this.history.canUndo;
+      redo.disabled = !this.history.canRedo;
+    };
+    this.history.onChange();
     button('reset', 'Reset', () => this.reset());
     button('keep', 'Keep to compare', () => settings.keep());
     button('link', 'Copy link', copy(() => taken.address(), 'Copy link'));
-    button('set', 'Copy as --set', copy(() => this.options(), 'Copy as --set'));
+    for (const [id, kind] of [['set', '--set'], ['python', 'Python'], ['toml', 'TOML']]) {
+      if (kind === 'TOML' && !player.data.toml) continue;
+      button(id, `Copy as ${kind}`, copy(() => taken.setting(kind), `Copy as ${kind}`));
+    }
     return bar;
   },
 
@@ -224,7 +247,14 @@ export const live = {
   },
 
   solved(p) {
-    return emitted.solver.solve(emitted, player.t, Float64Array.from(p), player.data.start);
+    return emitted.solver.solve(emitted, player.t, Float64Array.from(p), this.startAt(p));
+  },
+
+  /* Where the solver starts: the guess, which may follow the drawing. */
+  startAt(p) {
+    const start = Array.from(player.data.start), values = geometry.numbers(0, p);
+    geometry.places.forEach(([kind, column], k) => { if (kind === 'guess') start[column] = values[k]; });
+    return start;
   },
 
   pull(k, value) {
@@ -242,9 +272,41 @@ export const live = {
   },
 
   reset() {
+    this.goTo(this.given);
+    this.commit();
+  },
+
+  /* Take all values, as those of a step that is undone. */
+  goTo(values) {
     this.sliders.forEach(slider => slider.rest());
-    this.set(Object.fromEntries(this.names.map((name, k) => [name, this.given[k]])));
+    this.set(Object.fromEntries(this.names.map((name, k) => [name, values[k]])));
     this.writeFragment();
+  },
+
+  /* What was pulled is let go: a step that can be undone. */
+  commit() {
+    this.history.take();
+    this.writeFragment();
+  },
+
+  /* Take values with which there is a position at the time shown; else what is shown stays, and, where it is to be
+     said, why. Returns whether they were taken. */
+  attempt(values, name, isSaid) {
+    if (values.every((value, k) => value === this.values[k])) return true;
+    const motion = this.solved(values), { n, state: { index } } = player;
+    if (motion.q.subarray(index * n, (index + 1) * n).every(Number.isFinite)) {
+      this.values = values;
+      this.solve(motion);
+      return true;
+    }
+    if (isSaid) this.refused = `${name} cannot be pulled there. ${this.verdictOn(motion)}`;
+    this.showVerdict();
+    return false;
+  },
+
+  verdictOn(motion) {
+    const event = emitted.solver.explain(motion);
+    return verdictOf(motion, event && withSentence(event, motion));
   },
 
   showValues() {
@@ -252,13 +314,15 @@ export const live = {
   },
 
   /* Solve over the page's own times, and show what comes out. */
-  solve() {
+  solve(motion = null) {
     const begin = performance.now(), { data } = player;
     data.parameters.forEach((parameter, k) => { parameter.value = this.values[k]; });
     this.isChanged = true;
-    this.motion = this.values.every((value, k) => value === this.given[k]) ? null : this.solved(this.values);
+    this.refused = '';
+    this.motion = this.values.every((value, k) => value === this.given[k]) ? null : motion ?? this.solved(this.values);
     Object.assign(data, this.made);
     setNumbers(data.drawing, this.values);
+    if (this.motion) data.guess = this.startAt(this.values);
     settings.follow();
     if (this.motion) {
       // What ended it is looked for first: the status of the point says so.
@@ -297,8 +361,8 @@ export const live = {
   },
 
   showVerdict() {
-    this.verdict.textContent = player.data.message;
-    this.verdict.classList.toggle('failed', !player.data.success);
+    this.verdict.textContent = this.refused || player.data.message;
+    this.verdict.classList.toggle('failed', Boolean(this.refused) || !player.data.success);
   },
 
   /* ---- values in a link and on the command line ---- */
@@ -320,13 +384,8 @@ export const live = {
       .filter(([name, value]) => this.names.includes(name) && Number.isFinite(value));
     if (given.length) this.set(Object.fromEntries(given));
     else this.showValues();
+    this.history.take();
     // A page that opens is shown first; values are solved for before the next frame.
     setTimeout(() => requestAnimationFrame(() => taken.show(all)));
-  },
-
-  options() {
-    const { parameters } = player.data;
-    return parameters.filter(({ value, default: own }) => value !== own)
-      .map(({ name, value }) => `--set ${name}=${value}`).join(' ');
   },
 };

@@ -119,8 +119,8 @@ export const settings = {
   list() {
     byId('kept').replaceChildren(...this.kept.flatMap(setting => {
       const back = buttonOf(setting.name, () => {
-        live.set(Object.fromEntries(live.names.map((name, k) => [name, setting.values[k]])));
-        live.writeFragment();
+        live.goTo(setting.values);
+        live.commit();
       });
       back.title = 'Back to this setting';
       back.style.setProperty('--body', this.colourOf(setting));

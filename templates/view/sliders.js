@@ -10,6 +10,9 @@ import { buttonOf } from './elements.js';
 
 const SWAY = 6000;  // milliseconds from end to end and back
 
+/* Whether what is pulled takes round values. */
+export const snapping = { isOn: false };
+
 export class Slider {
   constructor(holder, id, { name, unit, low, high }, pull, done) {
     this.name = name;
@@ -22,7 +25,7 @@ export class Slider {
     label.htmlFor = id;
     Object.assign(slider, { type: 'range', id, step: 'any' });
     box.type = 'number';
-    slider.addEventListener('input', () => pull(+Number(slider.value).toPrecision(6)));
+    slider.addEventListener('input', () => pull(this.rounded(Number(slider.value))));
     slider.addEventListener('keydown', event => this.key(event));
     box.addEventListener('input', () => {
       if (box.value !== '' && Number.isFinite(box.valueAsNumber)) pull(box.valueAsNumber / units.factor(unit));
@@ -58,6 +61,16 @@ export class Slider {
     this.done();
   }
 
+  /* Of six digits, or, where it snaps, a multiple of what an arrow moves it by. */
+  rounded(value) {
+    if (!snapping.isOn) return +value.toPrecision(6);
+    return this.within(Math.round(value / this.step) * this.step);
+  }
+
+  within(value) {
+    return +Math.max(this.low, Math.min(this.high, value)).toPrecision(12);
+  }
+
   /* Take other ends. */
   reach(low, high) {
     this.low = low;
@@ -73,7 +86,7 @@ export class Slider {
     event.preventDefault();
     event.stopPropagation();
     const value = Math.round(this.value / this.step + way * (event.shiftKey ? 10 : 1)) * this.step;
-    this.pull(+Math.max(this.low, Math.min(this.high, value)).toPrecision(12));
+    this.pull(this.within(value));
     this.done();
   }
 

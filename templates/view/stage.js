@@ -4,6 +4,7 @@
    stage.first           extent of the motion that the page was made with: it stays in view
    stage.extent          function that gives what the picture must show
    stage.camera          null where all of it is seen, or { zoom, centre }
+   stage.held            null, or the view that stays while something is pulled
    stage.underlays       functions (ctx, view, palette, state) that draw below: a grid, kept settings
    stage.overlays        functions (ctx, view, palette, state) that draw on top: measures, poles
    stage.pointer         null, or { down, move, up } that get (world point, event) before hovering;
@@ -33,6 +34,7 @@ class Stage {
     this.first = player.data.extent;
     this.extent = () => player.data.extent;
     this.camera = null;
+    this.held = null;
     this.underlays = [];
     this.overlays = [];
     this.pointer = null;
@@ -75,7 +77,7 @@ class Stage {
   }
 
   draw(state) {
-    this.view = new View(this.extent(), this.width, this.height, NEAR, this.camera);
+    this.view = this.held ?? new View(this.extent(), this.width, this.height, NEAR, this.camera);
     const { ctx, view, palette } = this;
     ctx.fillStyle = palette.paper;  // a film has no other ground
     ctx.fillRect(0, 0, this.width, this.height);

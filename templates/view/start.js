@@ -20,6 +20,7 @@ import { settings } from './settings.js';
 import { taken } from './taken.js';
 import { measures } from './measures.js';
 import { Grab } from './grab.js';
+import { hands } from './hands.js';
 import { transmission } from './transmission_panel.js';
 import { connectTabs, shownPanel, showPanel } from './tabs.js';
 
@@ -218,7 +219,8 @@ function start() {
   live.build(byId('live'));
   if (hasBodies()) {
     points.build(byId('panel-points'));
-    stage.pointer = new Grab();
+    hands.build();
+    stage.pointer = firstOf(hands, new Grab());
     stage.listen();
     tools.build();
     if (isSpatial) orbit.build();
@@ -243,6 +245,12 @@ function start() {
   showPanel(transmission.branch ? 'transmission' : 'plots');
   showing.theme();
   if (player.data.angleUnit !== units.angle) showing.angles();
+}
+
+/* What a pointer means, as the first one that takes it says. */
+function firstOf(...pointers) {
+  const asked = kind => (...given) => pointers.some(pointer => pointer[kind](...given));
+  return { down: asked('down'), move: asked('move'), up: asked('up') };
 }
 
 /* The motion is another one: what was computed from the last one is dropped. */

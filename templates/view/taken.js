@@ -2,6 +2,7 @@
 
 import { player, SPEEDS } from './player.js';
 import { units } from './units.js';
+import { isGround } from './draw.js';
 import { AXES, isSpatial, orbit } from '#world';
 import { hasBodies, stage } from './stage.js';
 import { buttonOf, byId, svgElement } from './elements.js';
@@ -155,6 +156,25 @@ export const taken = {
     const own = items.map(item => columns.values(item).map(value => (value === null ? '' : value * units.factor(item.unit))));
     const rows = Array.from(player.t, (t, k) => [t, ...own.map(values => values[k])].join(','));
     return `${[heads.join(','), ...rows].join('\n')}\n`;
+  },
+
+  /* The parameters that are others than those of the model, as text to be pasted. */
+  setting(kind) {
+    if (kind === 'TOML') return this.toml();
+    const changed = player.data.parameters.filter(({ value, default: own }) => value !== own);
+    if (kind === '--set') return changed.map(({ name, value }) => `--set ${name}=${value}`).join(' ');
+    const values = `p = {${changed.map(({ name, value }) => `"${name}": ${value}`).join(', ')}}`;
+    return `${[...this.drawn(changed), `${values}  # for kc.solve(module, t, p)`].join('\n')}\n`;
+  },
+
+  /* Joints whose coordinates have changed, as calls of `Sketch`. */
+  drawn(changed) {
+    const { drawing: { hands }, parameters } = player.data;
+    const moved = hands.filter(hand => hand.is_drawn && hand.own.length === AXES.length && hand.own.some(k => changed.includes(parameters[k])));
+    const said = (call, some) => (some.length ? [`s.${call}(${some.map(({ name, own }) => (
+      `${name}=(${own.map(k => parameters[k].value).join(', ')})`)).join(', ')})`] : []);
+    const [ground, others] = [true, false].map(isFixed => moved.filter(({ place }) => isGround(place.frame) === isFixed));
+    return [...said('ground', ground), ...said('joints', others)];
   },
 
   /* The model with the parameters as they are shown. */

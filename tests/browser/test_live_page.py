@@ -375,7 +375,7 @@ def test_that_a_link_carries_the_values(open_page: Callable[..., Any]) -> None:
     page.get_by_label("a in m").fill("1.25")
     page.get_by_label("a in m").press("Tab")
     page.wait_for_function("live.values[0] === 1.25 && location.hash === '#a=1.25'")
-    assert page.evaluate("live.options()") == "--set a=1.25"
+    assert page.evaluate("taken.setting('--set')") == "--set a=1.25"
     url = page.url
     page.get_by_role("button", name="Reset").click()
     page.wait_for_function("live.values[0] === 1 && location.hash === ''")
