@@ -86,8 +86,8 @@ export const hands = {
       const change = this.step(hand, p, t, here, left);
       if (!change) break;
       const next = p.map((x, j) => (change[j] ? inRange(j, x + change[j]) : x)), there = placeOf(hand, next, t, here.q);
-      if (!there || gap(there.place, target) >= gap(here.place, target)) break;
-      [p, here] = [next, there];
+      if (there && gap(there.place, target) >= gap(here.place, target)) break;
+      [p, here] = [next, there];  // what cannot be assembled is tried, so that it is said why
     }
     return p.map((x, j) => (x === live.values[j] ? x : inRange(j, toStep(x, step))));
   },
@@ -109,10 +109,13 @@ export const hands = {
   /* Take a joint to a place, or towards it as far as it can be assembled; the drawing stays else. */
   pull(hand, target) {
     const step = snapping.isOn !== this.isTurnedOver ? stepOfGrid() : fineStep(), begin = this.where(hand);
+    let refused = '';
     for (const part of WAYS) {
-      const to = begin.map((x, i) => x + part * (target[i] - x)), values = this.solve(hand, to, step);
-      if (live.attempt(values, hand.name, part === 1)) return;
+      const to = begin.map((x, i) => x + part * (target[i] - x)), why = live.attempt(this.solve(hand, to, step), refused);
+      if (!why) return;
+      refused ||= `${hand.name} cannot be pulled there. ${why}`;
     }
+    live.refuse(refused);
   },
 
   /* ---- pointers, as stage.pointer ---- */

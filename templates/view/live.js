@@ -289,24 +289,26 @@ export const live = {
     this.writeFragment();
   },
 
-  /* Take values with which there is a position at the time shown; else what is shown stays, and, where it is to be
-     said, why. Returns whether they were taken. */
-  attempt(values, name, isSaid) {
-    if (values.every((value, k) => value === this.values[k])) return true;
+  /* Take values with which there is a position at the time shown; else what is shown stays, and the reason is
+     returned. `refused` is why others were not taken. */
+  attempt(values, refused) {
+    if (values.every((value, k) => value === this.values[k])) {
+      if (refused) this.refuse(refused);
+      return '';
+    }
     const motion = this.solved(values), { n, state: { index } } = player;
     if (motion.q.subarray(index * n, (index + 1) * n).every(Number.isFinite)) {
       this.values = values;
-      this.solve(motion);
-      return true;
+      this.solve(motion, refused);
+      return '';
     }
-    if (isSaid) this.refused = `${name} cannot be pulled there. ${this.verdictOn(motion)}`;
-    this.showVerdict();
-    return false;
-  },
-
-  verdictOn(motion) {
     const event = emitted.solver.explain(motion);
     return verdictOf(motion, event && withSentence(event, motion));
+  },
+
+  refuse(why) {
+    this.refused = why;
+    this.showVerdict();
   },
 
   showValues() {
@@ -314,11 +316,11 @@ export const live = {
   },
 
   /* Solve over the page's own times, and show what comes out. */
-  solve(motion = null) {
+  solve(motion = null, refused = '') {
     const begin = performance.now(), { data } = player;
     data.parameters.forEach((parameter, k) => { parameter.value = this.values[k]; });
     this.isChanged = true;
-    this.refused = '';
+    this.refused = refused;
     this.motion = this.values.every((value, k) => value === this.given[k]) ? null : motion ?? this.solved(this.values);
     Object.assign(data, this.made);
     setNumbers(data.drawing, this.values);
