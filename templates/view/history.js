@@ -1,6 +1,6 @@
 /* Steps that can be undone, each as what was there after it.
 
-   new History(now, show)   now() is what there is, a value of its own; show(value) goes back to one
+   new History(now, show)   now() gives a copy of the present value, show(value) goes back to one
    take()           a step was made: what was undone before is dropped
    undo(), redo()
    onChange         called when there is more or less to undo */
