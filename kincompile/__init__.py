@@ -24,7 +24,7 @@ _CATALOGUE = "kincompile.model.catalogue"
 _FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "log", "sqrt")
 _WITHOUT_SYMPY = ("kincompile.runtime", "kincompile.errors")
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 
 def __getattr__(name: str) -> Any:

@@ -25,11 +25,13 @@ def test_that_there_is_one_version():
     assert cited == kc.__version__
     assert 'version = { attr = "kincompile.__version__" }' in text("pyproject.toml")
     released = re.findall(r"^## \[?(\d+\.\d+\.\d+)", text("CHANGELOG.md"), re.MULTILINE)
-    assert released[:1] in ([], [kc.__version__])
+    assert released[:1] == [kc.__version__]
 
 
 def test_that_the_changelog_has_a_section_on_generated_code():
-    newest = re.split(r"^## ", text("CHANGELOG.md"), flags=re.MULTILINE)[1]
+    unreleased, newest = re.split(r"^## ", text("CHANGELOG.md"), flags=re.MULTILINE)[1:3]
+    assert unreleased.startswith("Unreleased\n")
+    assert newest.startswith(kc.__version__)
     assert "\n### Generated code\n" in newest
 
 
