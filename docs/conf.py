@@ -20,6 +20,7 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx_design",
+    "docs.builders.dark",
     "docs.builders.mathml",
     "docs.builders.site",
 ]

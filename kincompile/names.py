@@ -39,6 +39,12 @@ _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _UNIT = re.compile(r"(?!.*\*/)[\w°%·*/^.()+ -]*")
 
 
+def title_of(name: str) -> str:
+    """Return a name as a heading: `problem_3_5_6` as Problem 3.5.6."""
+    text = re.sub(r"(?<=\d) (?=\d)", ".", name.replace("_", " "))
+    return text[:1].upper() + text[1:]
+
+
 def name_problem(name: object, what: str) -> str | None:
     """Return a message about what is wrong with a name, or None.
 

@@ -31,7 +31,7 @@ OTHERS = ("museum", "project")
 """Texts without a mechanism of their own: real mistakes, and the week of the project."""
 
 MODEL = re.compile(r"^<!-- file: (\S+) -->\n```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
-LIVE = re.compile(r"^<!-- live: \w+ -->$", re.MULTILINE)
+LIVE = re.compile(r"^<!-- live: (\w+) -->$", re.MULTILINE)
 HEAD = re.compile(r"^\*Haug (.*?)\.\* (.*)$", re.MULTILINE)
 MATH = re.compile(r"^```math\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 STATED = re.compile(

@@ -16,6 +16,7 @@ import kincompile as kc
 from docs.builders import benchmark_plots, lessons, pictures
 from docs.builders.places import DOCS, EXAMPLES, ROOT, write
 from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.names import title_of
 from kincompile.space.catalogue import CONSTRAINTS as IN_SPACE
 
 if TYPE_CHECKING:
@@ -104,8 +105,9 @@ def _read(app: Sphinx, name: str, source: list[str]) -> None:
         source[0] = in_the_site(source[0], str(folder))
     if name == "course/syllabus":
         source[0] = source[0].replace(lessons.SYLLABUS, lessons.syllabus())
-    if name.startswith("course/"):
-        source[0] = lessons.LIVE.sub(_live(f"lesson_{PurePosixPath(name).name}"), source[0])
+    own = f"lesson_{PurePosixPath(name).name}" if name.startswith("course/") else ""
+    top = "/".join([".."] * name.count("/")) or "."
+    source[0] = lessons.LIVE.sub(lambda match: _live(own or match[1], top), source[0])
     if name == "names":
         source[0] = _with_links(source[0]) + _toctree("made/api/*")
     if name == "guides":
@@ -152,7 +154,7 @@ def title(name: str) -> str:
     """Return the name of an example as a heading."""
     if name == "rssr":
         return "RSSR"
-    return re.sub(r"(?<=\d) (?=\d)", ".", name.replace("_", " ")).capitalize()
+    return title_of(name)
 
 
 def _gallery() -> str:
@@ -160,7 +162,8 @@ def _gallery() -> str:
     rows = [(_last(name), what) for name, what in _rows()]
     cards = "".join(
         f":::{{grid-item-card}} {title(name)}\n:link: examples/{name}\n:link-type: doc\n"
-        f":img-top: motions/{name}.svg\n:img-alt: {title(name)} in motion\n{what}\n:::\n\n"
+        f":img-top: motions/{name}.svg\n:img-alt: {title(name)} in motion\n"
+        f"{what[0].upper()}{what[1:]}.\n:::\n\n"
         for name, what in rows
     )
     return (
@@ -185,7 +188,7 @@ def _example_page(name: str) -> str:
     ])  # fmt: skip
 
 
-def _live(name: str, top: str = "..") -> str:
+def _live(name: str, top: str) -> str:
     """Return a live page inside another."""
     return (
         f'```{{raw}} html\n<iframe class="live" src="{top}/live/{name}.html" title="{name}, live" '
@@ -208,8 +211,17 @@ def _write_motions() -> None:
         shown = pictures.still(last) if name.startswith("space/") else pictures.moving(name)
         write(GENERATED / "motions", {f"{last}.svg": shown})
         kc.page(kc.read_model(model)).write(live)
+    kc.page(_wiper()).write(live_folder / "wiper.html")
     for name in lessons.NAMES:
         kc.page(lessons.Lesson(name).model).write(live_folder / f"lesson_{name}.html")
+
+
+def _wiper() -> kc.Mechanism:
+    """Return the mechanism that a tutorial makes."""
+    text = (DOCS / "tutorials" / "linkage.md").read_text(encoding="utf-8")
+    programs, found = dict(lessons.MODEL.findall(text)), {}
+    exec(programs["wiper.py"], found)
+    return found["m"]
 
 
 # ---- public names --------------------------------------------------------------------------------

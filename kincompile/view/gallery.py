@@ -13,7 +13,7 @@ import numpy as np
 from kincompile.compiler import compile as compile_model
 from kincompile.errors import InputError, KincompileWarning
 from kincompile.model.mechanism import system_of
-from kincompile.names import listed
+from kincompile.names import listed, title_of
 from kincompile.report.templates import fill, read
 from kincompile.runtime.singular.assemblies import assemblies
 from kincompile.runtime.solve import solve
@@ -235,7 +235,7 @@ def _card(data: Mapping[str, Any], name: str, sizes: str, file: str = "") -> dic
     return {
         "tag": "a" if file else "div",
         "link": f' href="{escape(file)}"' if file else "",
-        "name": escape(name),
+        "name": escape(title_of(name)),
         "sizes": sizes,
         "data": as_json(_thinned(data)),
     }

@@ -91,6 +91,47 @@ def test_that_no_page_is_wider_than_a_phone_or_asks_for_more(open_file: Any) -> 
 
 
 @pytest.mark.browser
+@pytest.mark.parametrize("size", [(1280, 900), (1366, 768)])
+def test_that_the_first_screen_has_a_mechanism_to_pull(open_file: Any, size: tuple) -> None:
+    page = open_file(SITE / "index.html", size[0])
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    frame = page.frame_locator("iframe.live")
+    slider = frame.locator("#live input[type=range]").first
+    for shown in (frame.locator("canvas#canvas"), slider):
+        box = shown.bounding_box()
+        assert box["y"] > 80
+        assert box["y"] + box["height"] < size[1]
+    before = frame.locator("body").evaluate("() => Array.from(player.data.arrays.q)")
+    slider.press("ArrowRight")
+    page.wait_for_timeout(500)  # the motion is solved again
+    assert frame.locator("body").evaluate("() => Array.from(player.data.arrays.q)") != before
+    assert page.locator("article math").count() == 1
+    page.close()
+
+
+def luminance(colour: str) -> float:
+    """Return the relative luminance of a colour, by its definition in WCAG."""
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def test_that_every_drawing_of_the_site_has_colours_for_dark_paper() -> None:
+    drawings = list((SITE / "_images").glob("*.svg"))
+    assert len(drawings) > 90
+    letters = re.compile(r'<text\b[^>]*? fill="(#\w{6})"')
+    for path in drawings:
+        text = path.read_text(encoding="utf-8")
+        (dark,) = re.findall(r"@media ?\(prefers-color-scheme: ?dark\)\{(.*?)</style>", text, re.S)
+        if "!important" not in dark:
+            continue  # drawn with colours of the page, whose contrast test_contrast.py reads
+        changed = dict(re.findall(r'\[fill="(#\w+)"\][^{]*\{fill:(#\w+)', dark))
+        for colour in set(letters.findall(text)) - {"#ffffff"}:
+            ratio = (luminance(changed[colour]) + 0.05) / (luminance("#14171e") + 0.05)
+            assert ratio > 4.5, (path.name, colour)
+
+
+@pytest.mark.browser
 @pytest.mark.parametrize("word", ["slot", "weld", "hydraulic cylinder", "prismatic"])
 def test_that_the_search_finds_the_words_of_engineers(open_file: Any, word: str) -> None:
     page = open_file(SITE / "search.html")
