@@ -219,7 +219,8 @@ def _write_motions() -> None:
 def _wiper() -> kc.Mechanism:
     """Return the mechanism that a tutorial makes."""
     text = (DOCS / "tutorials" / "linkage.md").read_text(encoding="utf-8")
-    programs, found = dict(lessons.MODEL.findall(text)), {}
+    found: dict[str, kc.Mechanism] = {}
+    programs = dict(lessons.MODEL.findall(text))
     exec(programs["wiper.py"], found)
     return found["m"]
 
