@@ -92,7 +92,9 @@ def test_that_no_page_is_wider_than_a_phone_or_asks_for_more(open_file: Any) -> 
 
 @pytest.mark.browser
 @pytest.mark.parametrize("size", [(1280, 900), (1366, 768)])
-def test_that_the_first_screen_has_a_mechanism_to_pull(open_file: Any, size: tuple[int, int]) -> None:
+def test_that_the_first_screen_has_a_mechanism_to_pull(
+    open_file: Any, size: tuple[int, int]
+) -> None:
     page = open_file(SITE / "index.html", size[0])
     page.set_viewport_size({"width": size[0], "height": size[1]})
     frame = page.frame_locator("iframe.live")
