@@ -139,8 +139,8 @@ def emit(
         start = Start(real) if points == "one" else None
         emitted, found = transmission_files(system, language, *transmission, start=start)
         return emitted if language == target else _unit(emitted, found, system)
-    system = further.held_system(system)
     with _without_collector(system):
+        system = further.held_system(system)
         if form == "grouped" and (sensitivities or dynamics):
             what = "sensitivities" if sensitivities else "equations of motion"
             raise UnsupportedError(f"the grouped form has no {what}; use form='inline'")
@@ -377,8 +377,9 @@ def compile(  # noqa: A001 - the public name kc.compile
     UnsupportedError
         If there is no such target, it cannot print the mechanism, or there is no C compiler.
     """
-    system = further.held_system(system_of(model))
+    system = system_of(model)
     with _without_collector(system):
+        system = further.held_system(system)
         target = _loadable(target, system, form)
         code = _lowered(system, form)
         compiled = further.loaded(code, target)

@@ -82,6 +82,10 @@ def _calls(
     plan: SolvePlan, steps: Iterable[Assignment], names: Mapping[int, str]
 ) -> tuple[Assignment | BlockCall, ...]:
     """Return steps in which all unknowns of a block are one call."""
+    together: dict[object, list[int]] = {}
+    for node, (kind, *content) in enumerate(plan.nodes):
+        if kind == "linear":
+            together.setdefault((content[0], *content[3:]), []).append(node)
     found: dict[object, Assignment | BlockCall] = {}
     for item in steps:
         kind, *content = plan.nodes[item.node]
@@ -90,8 +94,7 @@ def _calls(
             continue
         name, size, _, *operands = content
         key = name, *operands
-        same = [k for k, node in enumerate(plan.nodes) if (*node[1:2], *node[4:]) == key]
-        called = sorted(same, key=lambda k: int(plan.nodes[k][3]))
+        called = sorted(together[key], key=lambda k: int(plan.nodes[k][3]))
         matrix, right = operands[: size * size], operands[size * size :]
         names_of_call = tuple(names[k] for k in called)
         found.setdefault(key, BlockCall(names_of_call, size, tuple(matrix), tuple(right)))

@@ -399,12 +399,15 @@ def _cheapest(graph: Graph, matrix: Matrix, sizes: Sizes, any_pivot: bool) -> Pi
             in_column[column] = in_column.get(column, 0) + 1
     best: tuple[bool, int, int, int] | None = None
     for row, entries in matrix.items():
+        wanted = [x for x in entries if any_pivot or graph.value_of(entries[x]) is not None]
+        if not wanted:
+            continue
         own = {column: sizes.of(graph, row, column, node) for column, node in entries.items()}
-        least = SAFE_PIVOT * max(own.values(), default=0.0)
-        for column, node in entries.items():
-            value = sizes.value(graph, row, column, node)
+        least = SAFE_PIVOT * max(own.values())
+        for column in wanted:
+            value = sizes.value(graph, row, column, entries[column])
             is_safe = (own[column] if math.isnan(value) else abs(value)) >= least
-            if not any_pivot and not (is_safe and graph.value_of(node) is not None):
+            if not any_pivot and not is_safe:
                 continue
             rank = (not is_safe, (len(entries) - 1) * (in_column[column] - 1), row, column)
             if best is None or rank < best:

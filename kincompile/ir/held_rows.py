@@ -18,17 +18,18 @@ import sympy
 from kincompile.ir.redundancy import driver_rows, evaluation
 from kincompile.model.resolve import SPIN, FreeEquation
 from kincompile.structure.choice import along_motion
-from kincompile.structure.idle import Web, loose_bodies
+from kincompile.structure.idle import Web
 from kincompile.structure.rank import ANGLES_FIRST, DEPENDENT, drivers_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from kincompile.ir.program import Program
     from kincompile.model.bodies import Body
     from kincompile.model.system import ConstraintSystem
+    from kincompile.structure.idle import Loose
     from kincompile.structure.rank import RankReport
 
     Array = NDArray[np.float64]
@@ -47,15 +48,21 @@ OPPOSITE = 1e-3
 
 
 def holding(
-    system: ConstraintSystem, program: Program, ranks: RankReport, motions: Array
+    system: ConstraintSystem,
+    program: Program,
+    ranks: RankReport,
+    motions: Array,
+    loose: Mapping[str, Loose],
 ) -> list[FreeEquation]:
-    """Return equations that hold motions (k, n), in scales, about as they are at the start."""
+    """Return equations that hold motions (k, n), in scales, about as they are at the start.
+
+    `loose` are the bodies that may turn, by geometry.
+    """
     names = [item.name for item in system.coordinates]
     spins = spins_of(system, ranks.state[0][0])
     solids = {body.name: body for body in system.bodies if body.name in spins}
     turns = {name for body in solids.values() for name in body.coordinates[SPACE:]}
     web = Web.of(system)
-    loose = loose_bodies(system)
     rows, weights = list[Any](), list[float]()
     wanted: list[tuple[str, Array | None]] = []
     for name, row, item in zip(names, np.eye(len(names)), system.coordinates, strict=True):

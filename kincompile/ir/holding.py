@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.ir.held_rows import SPACE, holding, product, spins_of
-from kincompile.ir.interpret import interpret
+from kincompile.ir.interpret import interpreter
 from kincompile.ir.lower import lower
 from kincompile.ir.redundancy import evaluation, rank_report
 from kincompile.model.points import BodyPoint
@@ -41,23 +41,25 @@ def with_held(system: ConstraintSystem, loose: Mapping[str, Loose]) -> Constrain
 
     `loose` are the bodies that may turn, by geometry.
     """
-    program = lower(system)
-    if len(system.equations) == len(system.coordinates) and _is_clear(system, program, loose):
+    if len(system.equations) == len(system.coordinates) and _is_clear(system, loose):
         return system
+    program = lower(system)
     ranks = rank_report(system, program)
     if not len(ranks.motions):
         return system
     motions = _Idle(system, program, ranks, Web.of(system), loose).motions()
-    return system.holding(holding(system, program, ranks, motions)) if len(motions) else system
+    if not len(motions):
+        return system
+    return system.holding(holding(system, program, ranks, motions, loose))
 
 
-def _is_clear(system: ConstraintSystem, program: Program, loose: Collection[str]) -> bool:
+def _is_clear(system: ConstraintSystem, loose: Collection[str]) -> bool:
     """Return whether some bodies are held well at the guess, were all others at rest."""
     guess = np.array([[item.guess for item in system.coordinates]])
-    with np.errstate(all="ignore"):
-        matrix = evaluation(program)(guess, np.zeros(1))[1][0]
     columns = _columns(system, loose)
-    own = matrix[np.abs(matrix[:, columns]).max(axis=1) > 0][:, columns]
+    with np.errstate(all="ignore"):
+        matrix = evaluation(lower(system.about(loose)))(guess, np.zeros(1))[1][0][:, columns]
+    own = matrix[np.abs(matrix).max(axis=1) > 0]
     if len(own) < len(columns) or not np.isfinite(own).all() or not own.any(axis=0).all():
         return False
     own = own / np.linalg.norm(own, axis=1, keepdims=True)
@@ -76,7 +78,8 @@ def moved_outputs(program: Program, ranks: RankReport) -> Array:
     count = len(ranks.motions)
     q = np.repeat(ranks.state[0], count, axis=0)
     q_dot, t = ranks.motions * ranks.scale, np.repeat(ranks.state[1], count)
-    rest, moving = (np.array(interpret(program, q, x, t)[4:6]) for x in (0 * q_dot, q_dot))
+    outputs = interpreter(program, ("outputs", "outputs_dot"))
+    rest, moving = (np.array(outputs(q, x, t)) for x in (0 * q_dot, q_dot))
     return np.asarray(((moving - rest) / (1 + np.abs(rest[0]))).swapaxes(0, 1))
 
 
@@ -113,10 +116,11 @@ class _Idle:
             if any(self.web.others[name] & solids[b] for name in solids[a])
         ]
         for points in (*ends, *joined):
+            shape = self._spread(points)
             members = {
                 name
                 for name, own in places.items()
-                if self._spread(points, own) == self._spread(points) < 2
+                if shape < 2 and self._spread(points, own) == shape
             }
             if members and members not in found:
                 found.append(members)
@@ -155,9 +159,9 @@ class _Idle:
         ]
         q, t = self.ranks.state
         motions = self.ranks.motions * self.ranks.scale
-        program = lower(self.system.observing(points, spinning=False))
+        program = lower(self.system.about(()).observing(points, spinning=False))
         states = np.repeat(q, len(motions), axis=0), motions, np.repeat(t, len(motions))
-        values, moved = interpret(program, *states)[4:6]
+        values, moved = interpreter(program, ("outputs", "outputs_dot"))(*states)
         places, rates, first = {}, {}, 0
         for body in own:
             shape = self.loose[body.name].centres.shape

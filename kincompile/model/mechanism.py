@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
 import sympy
@@ -272,6 +273,15 @@ class Mechanism(MatrixViews, TextViews):
             tasks=self.tasks,
             links=self.links,
         )
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Names of the freedoms that are held because nothing sees them, one for each.
+
+        Such as ``"spin of rod"``. They are found as `compile` and `inspect` find them.
+        """
+        found: tuple[str, ...] = import_module("kincompile.further").held_system(self.system()).held
+        return found
 
     def __repr__(self) -> str:
         """Return name and sizes."""

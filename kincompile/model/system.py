@@ -237,6 +237,17 @@ class ConstraintSystem(MatrixViews, TextViews):
         }  # fmt: skip
         return self._with(changed)
 
+    def about(self, bodies: Collection[str]) -> ConstraintSystem:
+        """Return the system with the constraints of some bodies alone, and without outputs."""
+        own = {x for body in self.bodies if body.name in bodies for x in body.coordinates}
+        found = tuple(item for item in self.constraints if own.intersection(item.columns))
+        names = tuple(name for item in found for name in item.equation_names)
+        changed = {
+            "constraints": found, "equations": names, "loads": (),
+            "observers": (), "body_points": (),
+        }  # fmt: skip
+        return self._with(changed)
+
     def holding(self, rows: Sequence[FreeEquation]) -> ConstraintSystem:
         """Return the system with equations more, for freedoms that nothing sees."""
         found = (*self.constraints, *rows)

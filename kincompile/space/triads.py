@@ -62,7 +62,7 @@ def _beside(vector: Sequence[Any], h: Sequence[Any]) -> list[Any]:
 def _farthest(h: Sequence[Any], defaults: Mapping[str, float]) -> list[Any]:
     sizes = [abs(evaluate(item, dict(defaults)) or 0.0) for item in h]
     nearest = sizes.index(min(sizes))
-    return [sympy.Integer(k == nearest) for k in range(3)]
+    return [int(k == nearest) for k in range(3)]
 
 
 def _tidy(vector: Sequence[Any]) -> tuple[Scalar, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from kincompile.criteria import SLIGHT
 from kincompile.model.arguments import Kind
-from kincompile.model.expressions import as_sympy, evaluate
+from kincompile.model.expressions import evaluate
 from kincompile.model.resolve import Joint
 
 if TYPE_CHECKING:
@@ -148,7 +148,7 @@ def spread(points: Array, size: float) -> int:
 
 
 def _numbers(given: Sequence[Scalar], defaults: Mapping[str, float]) -> list[float]:
-    return [float(evaluate(as_sympy(x), dict(defaults)) or 0.0) for x in given]
+    return [float(evaluate(x, dict(defaults)) or 0.0) for x in given]
 
 
 def _narrowed(

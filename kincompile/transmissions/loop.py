@@ -22,6 +22,7 @@ from kincompile.ir.redundancy import missing_drivers, rank_report
 from kincompile.model.inputs import input_name, input_rate, with_inputs
 from kincompile.model.mechanism import system_of
 from kincompile.names import column_name, listed, unknown
+from kincompile.structure.idle import loose_bodies
 from kincompile.structure.rank import DEPENDENT
 from kincompile.structure.remedies import advice
 from kincompile.tables import counted
@@ -112,7 +113,8 @@ def loop_of(
     _require_freedoms(system, names, matrix * ranks.scale)
     if len(ranks.motions):
         _require_determined(system, program, ranks, names, columns)
-        system = system.holding(holding(system, program, ranks, ranks.motions))
+        rows = holding(system, program, ranks, ranks.motions, loose_bodies(system))
+        system = system.holding(rows)
     parameters, rates = (tuple(map(own, names)) for own in (input_name, input_rate))
     return Loop(system, names, parameters, columns, system.held, twists, rates if is_moving else ())
 

@@ -6,6 +6,7 @@ a rotation vector. Lengths count in metres beside angles in radians.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -128,7 +129,11 @@ class Tree:
         x = x.copy()
 
         def at(y: Array) -> Array:
-            return np.where(free, _put(x, free, y), x)
+            return _put(x, free, y)
+
+        @lru_cache(maxsize=1)  # of a point residuals are asked for first, derivatives then
+        def rows(y: bytes) -> tuple[Array, Array]:
+            return self.rows(at(np.frombuffer(y)))
 
         bounds = (-np.inf, np.inf)
         if limits is not None:
@@ -136,8 +141,8 @@ class Tree:
             bounds = (limits[0][free], limits[1][free])
         if free.any() and self.rows(x)[0].size:
             done = least_squares(  # type: ignore[operator]
-                lambda y: self.rows(at(y))[0], x[free], lambda y: self.rows(at(y))[1][:, free],
-                bounds, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=self._steps(),
+                lambda y: rows(y.tobytes())[0], x[free], lambda y: rows(y.tobytes())[1][:, free],
+                bounds, xtol=1e-10, ftol=1e-15, gtol=1e-15, max_nfev=self._steps(),
             )  # fmt: skip
             x = at(done.x)
             for _ in range(3):  # Newton's method leaves rounding errors alone

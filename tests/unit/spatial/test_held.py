@@ -1,14 +1,19 @@
 """Freedoms that nothing sees are held, and everything else moves as it would without them."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import sympy
 
 import kincompile as kc
 from kincompile import spatial
 from kincompile.further import held_system
+from kincompile.model.mechanism import changed
 from tests import transmission_models
 
 X, Y, Z, O = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)  # noqa: E741 - the origin
+EXAMPLES = Path(__file__).parents[3] / "examples" / "space"
 T = np.linspace(0, 2, 17)
 ENDS = np.array([(0.1, 0, 0), (0.3, 0.05, 0.13)])
 ROD = "rod may spin about its own axis; nothing sees it, so it is held"
@@ -229,6 +234,31 @@ CASES = {
 def test_that_what_nothing_sees_is_held_and_nothing_else(case):
     make, wanted = CASES[case]
     assert sorted(held_system(make().system()).held) == wanted
+
+
+def test_that_the_rods_of_a_delta_robot_are_held_and_its_motors_move_as_with_distances():
+    """The example, whose six rods become bodies between balls."""
+    m = kc.read_model(EXAMPLES / "delta_robot.py")
+    flat = moved(m)
+    made, lengths = changed(m, bodies=[*m.bodies], constraints=[]), [0.2, 0.25, 0.5, 0.05]
+    numbers = {x.name: length for x, length in zip(m.parameters, lengths, strict=True)}
+    for item in m.constraints:
+        if not isinstance(item, spatial.Distance):
+            made.constraints.append(item)
+            continue
+        ends = []
+        for body, point in ((item.i, item.point_i), (item.j, item.point_j)):
+            local = [float(sympy.sympify(x).subs(numbers)) for x in point]
+            place = [flat[f"{x}_{body.name}"][0] for x in "xyz"]
+            ends.append(place + spatial.orientation(flat, body)[0].apply(local))
+        rod = made.body(item.name, tuple(ends[0]), x=tuple(ends[1] - ends[0]), y=(0.3, 1, 0.2))
+        made.add(spatial.Spherical(f"{item.name}_i", item.i, item.point_i, rod, O))
+        made.add(spatial.Spherical(f"{item.name}_j", rod, (0.5, 0, 0), item.j, item.point_j))
+    assert made.held == tuple(f"spin of rod_{k}{side}" for k in (1, 2, 3) for side in "ab")
+    assert m.held == ()
+    found = moved(made)
+    assert_the_same(found, flat, [f"theta_motor_{k}" for k in (1, 2, 3)])
+    assert found["x_rod_1a_dot"].std() > 0.01
 
 
 def test_that_a_ball_in_two_sockets_has_three_freedoms_that_are_held():
