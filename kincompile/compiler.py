@@ -220,7 +220,7 @@ def transmission_files(
             "that its drivers have at t = 0: give a better guess."
         )
     wanted = [*loop.outputs, *(x.name for x in loop.system.coordinates if is_drawn)]
-    smaller, q = without_legs(loop.system, wanted, q)
+    smaller, q = without_legs(loop.system, names, wanted, q)
     code = _lowered(smaller, "inline")
     assert isinstance(code, InlineProgram)
     further.require_small(code.program, "transmissions", "take")

@@ -51,14 +51,19 @@ NOISE = 1e-9
 
 
 def without_legs(
-    system: ConstraintSystem, outputs: Sequence[str], q: Array
+    system: ConstraintSystem, inputs: Collection[str], outputs: Sequence[str], q: Array
 ) -> tuple[ConstraintSystem, Array]:
     """Return a system without the legs that no output sees, and its position.
+
+    Without the bodies too that hang on the ground beside what inputs move and outputs see, such as
+    the other leg of a robot.
 
     Parameters
     ----------
     system
         Nothing in it depends on time.
+    inputs
+        Names of the parameters that change.
     outputs
         Names of the coordinates and outputs that are wanted; others are left out with the legs.
     q
@@ -67,6 +72,10 @@ def without_legs(
     seen = [x for x in system.observers if any(row.name in outputs for row in x.rows)]
     values = {x.name: float(v) for x, v in zip(system.coordinates, q, strict=True)}
     kept = {*outputs, *(column for x in seen for column in x.columns)}
+    if beside := _beside(system, {*kept, *inputs}):
+        bodies = [x for x in system.bodies if not beside.isdisjoint(x.coordinates)]
+        rest = [x for x in system.constraints if beside.isdisjoint(x.columns)]
+        system = system.rewritten(rest, []).without([x.name for x in bodies], seen)
     while True:
         wanted = kept.union(*(x.columns for x in system.constraints if not _is_plain(x)))
         bodies = [x for x in system.bodies if wanted.isdisjoint(x.coordinates)]
@@ -77,6 +86,28 @@ def without_legs(
         leg, rod = found
         rest = [x for x in system.constraints if not (leg.touches(x) or leg.holds(x))]
         system = system.rewritten(rest, [rod]).without(leg.names, seen)
+
+
+def _beside(system: ConstraintSystem, wanted: Collection[str]) -> set[str]:
+    """Return coordinates of bodies that no equation joins to any of these symbols."""
+    groups: list[set[str]] = []
+    for item in system.constraints:
+        own = {x for x in item.columns if x is not None} | _symbols(item).intersection(wanted)
+        joined = [group for group in groups if not group.isdisjoint(own)]
+        groups = [x for x in groups if x not in joined] + [own.union(*joined)]
+    of_bodies = {x for body in system.bodies for x in body.coordinates}
+    apart = (group for group in groups if group.isdisjoint(wanted) and group <= of_bodies)
+    return set().union(*apart)
+
+
+def _symbols(item: Joint | FreeEquation) -> set[str]:
+    """Return the names of the symbols in a constraint."""
+    if isinstance(item, FreeEquation):
+        values: list[Any] = [*item.expressions]
+    else:
+        points = (x for point in item.points.values() for x in point)
+        values = [*item.scalars.values(), *points, *item.profiles.values()]
+    return set().union(*(symbol_names(as_sympy(x)) for x in values))
 
 
 def lengths_of(system: ConstraintSystem, inputs: Collection[str]) -> list[sympy.Expr]:

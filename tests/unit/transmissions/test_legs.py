@@ -197,3 +197,20 @@ def test_what_an_output_sees_stays():
     found = emitted(models.ankle_with_rods(), ends)["COORDINATES"]
     assert {"e0_rod_left", "e0_cylinder_left"} <= set(found)
     assert "e0_rod_right" not in found
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_a_linkage_beside_that_no_input_moves_is_left_out(tied):
+    alone, both = models.crank_rocker(), models.crank_rocker()
+    other = both.body("other", (0.1, 0, 0.3))
+    both.add(kc.Revolute("Q", both.ground, (0.1, 0), other, (0, 0)))
+    rocker = next(body for body in both.bodies if body.name == "rocker")
+    angle = both.parameter("angle", 0.3, "rad")
+    both.add(kc.RelativeAngle("tie", rocker if tied else both.ground, other, angle))
+    ends = ["motor"], ["rocker.phi"]
+    found, wanted = emitted(both, ends), emitted(alone, ends)
+    assert ("x_other" in found["COORDINATES"] or "phi_other" in found["COORDINATES"]) is tied
+    path = [[1.5 + 0.1 * k] for k in range(9)]
+    for here, there in zip(poses(found, path), poses(wanted, path), strict=True):
+        np.testing.assert_allclose(here[0], there[0], rtol=0, atol=1e-13)
+        np.testing.assert_allclose(here[1], there[1], rtol=1e-9)
