@@ -64,8 +64,8 @@ RUNTIME = "runtime"
 # loads the modules of the one that is emitted, the command line the command that is called, and the
 # compiler the stages that a model needs. The options of a motion are formulas: to read them takes
 # SymPy, and to print a help does not; so do the tables of sweeps, tolerances and fits. Masses and
-# forces are loaded where a mechanism has any, SciPy for a robot's file, and the compiler's floor where
-# a mechanism is asked what it holds.
+# forces are loaded where a mechanism has any, SciPy for a robot's file, the compiler where a
+# mechanism is asked what it holds.
 DEFERRED = {
     PACKAGE,
     "kincompile.cli",
