@@ -88,7 +88,7 @@ def without_legs(
         system = system.rewritten(rest, [rod]).without(leg.names, seen)
 
 
-def _beside(system: ConstraintSystem, wanted: Collection[str]) -> set[str]:
+def _beside(system: ConstraintSystem, wanted: Collection[str | None]) -> set[str]:
     """Return coordinates of bodies that no equation joins to any of these symbols."""
     groups: list[set[str]] = []
     for item in system.constraints:
