@@ -244,7 +244,7 @@ def test_that_the_rods_of_a_delta_robot_are_held_and_its_motors_move_as_with_dis
     made, lengths = changed(m, bodies=[*m.bodies], constraints=[]), [0.2, 0.25, 0.5, 0.05]
     numbers = {x.name: length for x, length in zip(m.parameters, lengths, strict=True)}
     for item in m.constraints:
-        if not isinstance(item, spatial.Distance):
+        if type(item).__name__ != "Distance":
             made.constraints.append(item)
             continue
         ends = []
