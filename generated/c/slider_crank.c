@@ -35,7 +35,7 @@ enum {
     NONZEROS = 21,  // of Phi_q
     LANES = 32,  // points in a strip
     FROM_MEMORY = (4 << 20) / 8 / (48),  // points whose results leave little of a cache
-    FACTORS = 8,  // numbers that the planned solve keeps of Phi_q
+    FACTORS = 1,  // numbers that the planned solve keeps of Phi_q
     BLOCKS = 1,  // blocks of the planned solve
 };
 
@@ -100,7 +100,7 @@ typedef struct {
     double Phi_q[21][LANES];
     double nu[9][LANES];
     double gamma[9][LANES];
-    double of_angles[4][LANES];  // cosines and sines
+    double of_angles[6][LANES];  // cosines and sines
     line on;
     double ends[K > 0 ? K : 1][LANES];
 } strip;
@@ -158,16 +158,6 @@ _always_inline int64_t cos_sin(double angle, int exact, double *cosine, double *
 }
 
 // Phi and Phi_q in one go: a step of Newton's method.
-_always_inline int64_t position_angles_at(strip *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double phi_crank = at->q[2][lane];
-    const double phi_rod = at->q[5][lane];
-    far = far | cos_sin(phi_crank, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
-    far = far | cos_sin(phi_rod, exact, &at->of_angles[2][lane], &at->of_angles[3][lane]);
-    return far;
-}
-
 _always_inline void position_at(strip *at, size_t lane)
 {
     const double x_crank = at->q[0][lane];
@@ -220,12 +210,7 @@ _always_inline void position_at(strip *at, size_t lane)
 
 static void position_of_strip(strip *at, size_t count)
 {
-    int64_t far = 0;
     const size_t all = _abreast(count);
-    for (size_t lane = 0; lane < all; lane++)
-        far |= position_angles_at(at, lane, 0) & -(int64_t)(lane < count);
-    for (size_t lane = 0; far && lane < count; lane++)
-        position_angles_at(at, lane, 1);
     for (size_t lane = 0; lane < all; lane++)
         position_at(at, lane);
 }
@@ -259,16 +244,6 @@ static void nu_of_strip(strip *at, size_t count)
 }
 
 // Right side of the acceleration equation Phi_q q_ddot = gamma.
-_always_inline int64_t gamma_angles_at(strip *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double phi_crank = at->q[2][lane];
-    const double phi_rod = at->q[5][lane];
-    far = far | cos_sin(phi_crank, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
-    far = far | cos_sin(phi_rod, exact, &at->of_angles[2][lane], &at->of_angles[3][lane]);
-    return far;
-}
-
 _always_inline void gamma_at(strip *at, size_t lane)
 {
     const double phi_crank_dot = at->q_dot[2][lane];
@@ -305,18 +280,13 @@ _always_inline void gamma_at(strip *at, size_t lane)
 
 static void gamma_of_strip(strip *at, size_t count)
 {
-    int64_t far = 0;
     const size_t all = _abreast(count);
-    for (size_t lane = 0; lane < all; lane++)
-        far |= gamma_angles_at(at, lane, 0) & -(int64_t)(lane < count);
-    for (size_t lane = 0; far && lane < count; lane++)
-        gamma_angles_at(at, lane, 1);
     for (size_t lane = 0; lane < all; lane++)
         gamma_at(at, lane);
 }
 
-// Phi, Phi_q, nu and gamma in one go.
-_always_inline int64_t kinematics_angles_at(strip *at, size_t lane, int exact)
+// Cosines and sines.
+_always_inline int64_t angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double phi_crank = at->q[2][lane];
@@ -326,6 +296,17 @@ _always_inline int64_t kinematics_angles_at(strip *at, size_t lane, int exact)
     return far;
 }
 
+static void angles_of_strip(strip *at, size_t count)
+{
+    int64_t far = 0;
+    const size_t all = _abreast(count);
+    for (size_t lane = 0; lane < all; lane++)
+        far |= angles_at(at, lane, 0) & -(int64_t)(lane < count);
+    for (size_t lane = 0; far && lane < count; lane++)
+        angles_at(at, lane, 1);
+}
+
+// Phi, Phi_q, nu and gamma in one go.
 _always_inline void kinematics_at(strip *at, size_t lane)
 {
     const double x_crank = at->q[0][lane];
@@ -416,12 +397,7 @@ _always_inline void kinematics_at(strip *at, size_t lane)
 
 static void kinematics_of_strip(strip *at, size_t count)
 {
-    int64_t far = 0;
     const size_t all = _abreast(count);
-    for (size_t lane = 0; lane < all; lane++)
-        far |= kinematics_angles_at(at, lane, 0) & -(int64_t)(lane < count);
-    for (size_t lane = 0; far && lane < count; lane++)
-        kinematics_angles_at(at, lane, 1);
     for (size_t lane = 0; lane < all; lane++)
         kinematics_at(at, lane);
 }
@@ -433,24 +409,11 @@ static void kinematics_of_strip(strip *at, size_t count)
 // block: phi_rod by wrist_pin.y
 _always_inline void factor_at(strip *at, size_t lane)
 {
-    const double main_bearing_x_phi_crank = at->Phi_q[1][lane];
-    const double main_bearing_y_phi_crank = at->Phi_q[3][lane];
-    const double crank_pin_x_phi_crank = at->Phi_q[5][lane];
-    const double crank_pin_x_phi_rod = at->Phi_q[7][lane];
-    const double crank_pin_y_phi_crank = at->Phi_q[9][lane];
     const double crank_pin_y_phi_rod = at->Phi_q[11][lane];
-    const double wrist_pin_x_phi_rod = at->Phi_q[13][lane];
     const double wrist_pin_y_phi_rod = at->Phi_q[16][lane];
     const double determinant = wrist_pin_y_phi_rod + crank_pin_y_phi_rod;
     const double k_2 = 1.0 / determinant;
-    at->F[0][lane] = main_bearing_x_phi_crank;
-    at->F[1][lane] = main_bearing_y_phi_crank;
-    at->F[2][lane] = crank_pin_x_phi_crank;
-    at->F[3][lane] = crank_pin_x_phi_rod;
-    at->F[4][lane] = crank_pin_y_phi_crank;
-    at->F[5][lane] = crank_pin_y_phi_rod;
-    at->F[6][lane] = wrist_pin_x_phi_rod;
-    at->F[7][lane] = k_2;
+    at->F[0][lane] = k_2;
     at->determinants[0][lane] = determinant;
 }
 
@@ -462,17 +425,19 @@ static void factor_of_strip(strip *at, size_t count)
 }
 
 // x of Phi_q x = right.
-_always_inline void solve_at(double (*restrict F)[LANES],
-    double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)
+_always_inline void solve_at(double (*restrict Phi_q)[LANES],
+    double (*restrict F)[LANES], double (*restrict right)[LANES],
+    double (*restrict to)[LANES], size_t lane)
 {
-    const double main_bearing_x_phi_crank = F[0][lane];
-    const double main_bearing_y_phi_crank = F[1][lane];
-    const double crank_pin_x_phi_crank = F[2][lane];
-    const double crank_pin_x_phi_rod = F[3][lane];
-    const double crank_pin_y_phi_crank = F[4][lane];
-    const double crank_pin_y_phi_rod = F[5][lane];
-    const double wrist_pin_x_phi_rod = F[6][lane];
-    const double k_2 = F[7][lane];
+    (void)Phi_q, (void)F;
+    const double main_bearing_x_phi_crank = Phi_q[1][lane];
+    const double main_bearing_y_phi_crank = Phi_q[3][lane];
+    const double crank_pin_x_phi_crank = Phi_q[5][lane];
+    const double crank_pin_x_phi_rod = Phi_q[7][lane];
+    const double crank_pin_y_phi_crank = Phi_q[9][lane];
+    const double crank_pin_y_phi_rod = Phi_q[11][lane];
+    const double wrist_pin_x_phi_rod = Phi_q[13][lane];
+    const double k_2 = F[0][lane];
     const double main_bearing_x = right[0][lane];
     const double main_bearing_y = right[1][lane];
     const double crank_pin_x = right[2][lane];
@@ -559,17 +524,17 @@ _always_inline void missed_at(const strip *at, const double (*weight)[LANES],
 }
 
 // No two of these overlap: the loop takes several lanes.
-static void solve_of_strip(double (*restrict F)[LANES], double (*restrict right)[LANES],
-    double (*restrict to)[LANES], size_t count)
+static void solve_of_strip(double (*restrict Phi_q)[LANES], double (*restrict F)[LANES],
+    double (*restrict right)[LANES], double (*restrict to)[LANES], size_t count)
 {
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        solve_at(F, right, to, lane);
+        solve_at(Phi_q, F, right, to, lane);
 }
 
 // Copy numbers of `count` points, from point `start` on, into rows; what is not finite shows in
 // `check`, which stays 0 otherwise.
-static inline void read_rows(double (*rows)[LANES], size_t size, slider_crank_input from, size_t start,
+static void read_rows(double (*rows)[LANES], size_t size, slider_crank_input from, size_t start,
     size_t count, double *check)
 {
     for (size_t i = 0; i < size; i++) {
@@ -615,7 +580,7 @@ _always_inline void copy(double *to, const double *from, size_t size, int is_far
 }
 
 // Copy rows to where they are wanted: all of them, or those listed.
-static inline void store_rows(slider_crank_output to, double (*rows)[LANES], const int *listed, int size,
+static void store_rows(slider_crank_output to, double (*rows)[LANES], const int *listed, int size,
     size_t start, size_t count, int is_far)
 {
     if (to.first == NULL)
@@ -666,7 +631,8 @@ static const quantity QUANTITY[] = {
 };
 enum { QUANTITIES = 4, MATRICES = 81 };
 
-// The kernels, the quantities that each gives, as bits, and the quantities that depend on rates.
+// The kernels, the quantities that each gives, as bits, and the quantities that depend on cosines and
+// sines, and on rates.
 static const struct {
     unsigned gives;
     void (*run)(strip *, size_t);
@@ -680,11 +646,17 @@ static const struct {
     {15, kinematics_of_strip},
 #endif
 };
-enum { KERNELS = sizeof KERNEL / sizeof *KERNEL, READS_RATES = 8 };
+enum {
+    KERNELS = sizeof KERNEL / sizeof *KERNEL,
+    READS_ANGLES = 11,
+    READS_RATES = 8,
+};
 
 // Run the first kernel that gives all that is wanted, or as many as it takes.
 static void run_kernels(unsigned wanted, strip *b, size_t count)
 {
+    if (wanted & READS_ANGLES)
+        angles_of_strip(b, count);
     for (int k = 0; k < KERNELS; k++)
         if ((wanted & ~KERNEL[k].gives) == 0) {
             KERNEL[k].run(b, count);
@@ -741,9 +713,8 @@ static void place_constants(strip *b, double *matrices, size_t count)
         }
 }
 
-// Write a quantity of a strip of points: as vectors or nonzeros, and as whole matrices. It is called
-// once a quantity, so that a compiler knows the sizes.
-_always_inline void write_quantity(const slider_crank_batch *batch, const quantity *q, strip *b,
+// Write a quantity of a strip of points: as vectors or nonzeros, and as whole matrices.
+static void write_quantity(const slider_crank_batch *batch, const quantity *q, strip *b,
     double *matrices, size_t start, size_t count, int is_far)
 {
     const slider_crank_output whole = output_of(batch, q->result);
@@ -784,18 +755,9 @@ int slider_crank_evaluate(const slider_crank_batch *batch)
         if (wants_rates)
             read_rows(b.q_dot, N, batch->q_dot, start, count, check);
         run_kernels(wanted, &b, count);
-        if (wanted & 1)
-            write_quantity(batch, &QUANTITY[0], &b, matrices, start, count,
-                is_far);
-        if (wanted & 2)
-            write_quantity(batch, &QUANTITY[1], &b, matrices, start, count,
-                is_far);
-        if (wanted & 4)
-            write_quantity(batch, &QUANTITY[2], &b, matrices, start, count,
-                is_far);
-        if (wanted & 8)
-            write_quantity(batch, &QUANTITY[3], &b, matrices, start, count,
-                is_far);
+        for (int k = 0; k < QUANTITIES; k++)
+            if (wanted & 1u << k)
+                write_quantity(batch, &QUANTITY[k], &b, matrices, start, count, is_far);
     }
 #ifdef __x86_64__
     if (is_far)
@@ -819,7 +781,7 @@ void slider_crank_solve(const slider_crank_system *system)
         read_rows(b.Phi_q, NONZEROS, system->nonzeros, start, count, check);
         read_rows(right, M, system->b, start, count, check);
         factor_of_strip(&b, count);
-        solve_of_strip(b.F, right, x, count);
+        solve_of_strip(b.Phi_q, b.F, right, x, count);
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
@@ -899,13 +861,20 @@ typedef struct {
     double ends[K > 0 ? K : 1];
 } state;
 
+// Nothing but parameter sets is led along lines.
+#ifdef _WITHOUT_SETS
+#define _is_led(points) 0
+#else
+#define _is_led(points) (points)->on.is_led
+#endif
+
 // Take up a lane of a strip as a good point.
 static void take_up(state *at, const strip *b, size_t k)
 {
     for (int i = 0; i < ROWS; i++)
         (&at->t)[i] = ((const double *)b)[i * LANES + (int)k];
     at->on.is_led = b->on.is_led;
-    if (b->on.is_led) {
+    if (_is_led(b)) {
         at->on = b->on;
         for (int i = 0; i < K; i++)
             at->ends[i] = b->ends[i][k];
@@ -919,7 +888,7 @@ static void put_at(strip *b, const state *at, size_t first, size_t end)
         for (size_t k = first; k < end; k++)
             ((double *)b)[(size_t)i * LANES + k] = (&at->t)[i];
     b->on.is_led = at->on.is_led;
-    if (at->on.is_led) {
+    if (_is_led(at)) {
         b->on = at->on;
         for (int i = 0; i < K; i++)
             for (size_t k = first; k < end; k++)
@@ -932,7 +901,7 @@ static void keep(strip *to, const strip *b)
 {
     memcpy(to, b, ROWS * sizeof b->t);
     to->on.is_led = b->on.is_led;
-    if (b->on.is_led) {
+    if (_is_led(b)) {
         to->on = b->on;
         memcpy(to->ends, b->ends, sizeof b->ends);
     }
@@ -972,34 +941,42 @@ static void put_beside(strip *to, const strip *b, double part, size_t count)
         to->t[k] = b->on.t;
 }
 
-// The kernels of points that may be on lines.
+// Phi and Phi_q at points that have come elsewhere. The cosines and sines are then those of nu and
+// gamma too.
+static void position_afresh(strip *b, size_t count)
+{
+    angles_of_strip(b, count);
+    position_of_strip(b, count);
+}
+
+// The kernels of points that may be on lines, of which position is the first where a point is.
 _never_inline void position_on_line(strip *b, size_t count)
 {
     double part[LANES];
-    if (!b->on.is_led) {
-        position_of_strip(b, count);
+    if (!_is_led(b)) {
+        position_afresh(b, count);
         return;
     }
     memcpy(part, b->t, count * sizeof *part);
     put_beside(b, b, 0.0, count);
-    position_of_strip(b, count);
+    position_afresh(b, count);
     memcpy(b->t, part, count * sizeof *part);
 }
 
 _never_inline void nu_on_line(strip *b, size_t count)
 {
     const size_t all = _abreast(count);
-    if (!b->on.is_led) {
+    if (!_is_led(b)) {
         nu_of_strip(b, count);
         return;
     }
     strip beside;
     memcpy(beside.q, b->q, sizeof b->q);
     put_beside(&beside, b, -FIRST_DIFFERENCE, count);
-    position_of_strip(&beside, count);
+    position_afresh(&beside, count);
     memcpy(b->nu, beside.Phi, sizeof b->nu);
     put_beside(&beside, b, FIRST_DIFFERENCE, count);
-    position_of_strip(&beside, count);
+    position_afresh(&beside, count);
     for (int i = 0; i < M; i++)
         for (size_t k = 0; k < all; k++)
             b->nu[i][k] = (b->nu[i][k] - beside.Phi[i][k]) / (2 * FIRST_DIFFERENCE);
@@ -1008,7 +985,7 @@ _never_inline void nu_on_line(strip *b, size_t count)
 _never_inline void gamma_on_line(strip *b, size_t count)
 {
     const size_t all = _abreast(count);
-    if (!b->on.is_led) {
+    if (!_is_led(b)) {
         gamma_of_strip(b, count);
         return;
     }
@@ -1022,7 +999,7 @@ _never_inline void gamma_on_line(strip *b, size_t count)
             for (size_t k = 0; k < all; k++)
                 beside.q[i][k] = b->q[i][k] + part * b->q_dot[i][k];
         put_beside(&beside, b, part, count);
-        position_of_strip(&beside, count);
+        position_afresh(&beside, count);
         for (int i = 0; i < M; i++)
             for (size_t k = 0; k < all; k++)
                 b->gamma[i][k] -= beside.Phi[i][k];
@@ -1037,7 +1014,7 @@ static void missed_of_strip(const strip *b, const double (*weight)[LANES],
     double *restrict by_velocity, double *restrict by_acceleration, size_t count)
 {
     const size_t all = _abreast(count);
-    if (!b->on.is_led) {
+    if (!_is_led(b)) {
         for (size_t k = 0; k < all; k++)
             missed_at(b, weight, &by_velocity[k], &by_acceleration[k], k);
         return;
@@ -1164,7 +1141,7 @@ static void correct(strip *b, const scales *s, int most, outcome *o, size_t lane
         position_on_line(b, lanes);
         factor_of_strip(b, lanes);
         double change[N][LANES];
-        solve_of_strip(b->F, b->Phi, change, lanes);
+        solve_of_strip(b->Phi_q, b->F, b->Phi, change, lanes);
         for (int i = 0; i < N; i++)
             for (size_t lane = 0; lane < all; lane++) {
                 b->q[i][lane] -= going[lane] != 0 ? change[i][lane] : 0.0;
@@ -1212,11 +1189,11 @@ static void complete(strip *b, const scales *s, outcome *o, size_t lanes)
         }
     // A third right side, of the size of the equations' terms, shows how near to singular Phi_q is.
     double answer[N][LANES];
-    solve_of_strip(b->F, right, answer, lanes);
+    solve_of_strip(b->Phi_q, b->F, right, answer, lanes);
     nu_on_line(b, lanes);
-    solve_of_strip(b->F, b->nu, b->q_dot, lanes);
+    solve_of_strip(b->Phi_q, b->F, b->nu, b->q_dot, lanes);
     gamma_on_line(b, lanes);
-    solve_of_strip(b->F, b->gamma, b->q_ddot, lanes);
+    solve_of_strip(b->Phi_q, b->F, b->gamma, b->q_ddot, lanes);
     for (int i = 0; i < N; i++)
         for (size_t lane = 0; lane < all; lane++) {
             const double moved = fabs(answer[i][lane]) * s->inverse[i][lane];

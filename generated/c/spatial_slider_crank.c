@@ -40,7 +40,7 @@ enum {
     NONZEROS = 97,  // of Phi_q
     LANES = 32,  // points in a strip
     FROM_MEMORY = (4 << 20) / 8 / (193),  // points whose results leave little of a cache
-    FACTORS = 88,  // numbers that the planned solve keeps of Phi_q
+    FACTORS = 44,  // numbers that the planned solve keeps of Phi_q
     BLOCKS = 6,  // blocks of the planned solve
 };
 
@@ -245,16 +245,6 @@ _always_inline double angle_of(double y, double x)
 }
 
 // Phi and Phi_q in one go: a step of Newton's method.
-_always_inline int64_t position_angles_at(strip *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double omega = at->p[2][lane];
-    const double t = at->t[lane];
-    const double motor_C = omega * t;
-    far = far | cos_sin(motor_C, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
-    return far;
-}
-
 _always_inline void position_at(strip *at, size_t lane)
 {
     const double x_crank = at->q[0][lane];
@@ -478,27 +468,12 @@ _always_inline void position_at(strip *at, size_t lane)
 
 static void position_of_strip(strip *at, size_t count)
 {
-    int64_t far = 0;
     const size_t all = _abreast(count);
-    for (size_t lane = 0; lane < all; lane++)
-        far |= position_angles_at(at, lane, 0) & -(int64_t)(lane < count);
-    for (size_t lane = 0; far && lane < count; lane++)
-        position_angles_at(at, lane, 1);
     for (size_t lane = 0; lane < all; lane++)
         position_at(at, lane);
 }
 
 // Right side of the velocity equation Phi_q q_dot = nu = -Phi_t.
-_always_inline int64_t nu_angles_at(strip *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double omega = at->p[2][lane];
-    const double t = at->t[lane];
-    const double motor_C = omega * t;
-    far = far | cos_sin(motor_C, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
-    return far;
-}
-
 _always_inline void nu_at(strip *at, size_t lane)
 {
     const double e0_crank = at->q[3][lane];
@@ -553,27 +528,12 @@ _always_inline void nu_at(strip *at, size_t lane)
 
 static void nu_of_strip(strip *at, size_t count)
 {
-    int64_t far = 0;
     const size_t all = _abreast(count);
-    for (size_t lane = 0; lane < all; lane++)
-        far |= nu_angles_at(at, lane, 0) & -(int64_t)(lane < count);
-    for (size_t lane = 0; far && lane < count; lane++)
-        nu_angles_at(at, lane, 1);
     for (size_t lane = 0; lane < all; lane++)
         nu_at(at, lane);
 }
 
 // Right side of the acceleration equation Phi_q q_ddot = gamma.
-_always_inline int64_t gamma_angles_at(strip *at, size_t lane, int exact)
-{
-    int64_t far = 0;
-    const double omega = at->p[2][lane];
-    const double t = at->t[lane];
-    const double motor_C = omega * t;
-    far = far | cos_sin(motor_C, exact, &at->of_angles[0][lane], &at->of_angles[1][lane]);
-    return far;
-}
-
 _always_inline void gamma_at(strip *at, size_t lane)
 {
     const double e0_crank = at->q[3][lane];
@@ -735,12 +695,7 @@ _always_inline void gamma_at(strip *at, size_t lane)
 
 static void gamma_of_strip(strip *at, size_t count)
 {
-    int64_t far = 0;
     const size_t all = _abreast(count);
-    for (size_t lane = 0; lane < all; lane++)
-        far |= gamma_angles_at(at, lane, 0) & -(int64_t)(lane < count);
-    for (size_t lane = 0; far && lane < count; lane++)
-        gamma_angles_at(at, lane, 1);
     for (size_t lane = 0; lane < all; lane++)
         gamma_at(at, lane);
 }
@@ -795,8 +750,8 @@ static void outputs_q_of_strip(strip *at, size_t count)
         outputs_q_at(at, lane);
 }
 
-// Phi, Phi_q, nu and gamma in one go.
-_always_inline int64_t kinematics_angles_at(strip *at, size_t lane, int exact)
+// Cosines and sines.
+_always_inline int64_t angles_at(strip *at, size_t lane, int exact)
 {
     int64_t far = 0;
     const double omega = at->p[2][lane];
@@ -806,6 +761,17 @@ _always_inline int64_t kinematics_angles_at(strip *at, size_t lane, int exact)
     return far;
 }
 
+static void angles_of_strip(strip *at, size_t count)
+{
+    int64_t far = 0;
+    const size_t all = _abreast(count);
+    for (size_t lane = 0; lane < all; lane++)
+        far |= angles_at(at, lane, 0) & -(int64_t)(lane < count);
+    for (size_t lane = 0; far && lane < count; lane++)
+        angles_at(at, lane, 1);
+}
+
+// Phi, Phi_q, nu and gamma in one go.
 _always_inline void kinematics_at(strip *at, size_t lane)
 {
     const double x_crank = at->q[0][lane];
@@ -1178,12 +1144,7 @@ _always_inline void kinematics_at(strip *at, size_t lane)
 
 static void kinematics_of_strip(strip *at, size_t count)
 {
-    int64_t far = 0;
     const size_t all = _abreast(count);
-    for (size_t lane = 0; lane < all; lane++)
-        far |= kinematics_angles_at(at, lane, 0) & -(int64_t)(lane < count);
-    for (size_t lane = 0; far && lane < count; lane++)
-        kinematics_angles_at(at, lane, 1);
     for (size_t lane = 0; lane < all; lane++)
         kinematics_at(at, lane);
 }
@@ -1294,34 +1255,14 @@ _always_inline void factor_at(strip *at, size_t lane)
     const double O_g_e1_crank = at->Phi_q[8][lane];
     const double O_g_e2_crank = at->Phi_q[9][lane];
     const double O_g_e3_crank = at->Phi_q[10][lane];
-    const double A_x_e0_crank = at->Phi_q[12][lane];
-    const double A_x_e1_crank = at->Phi_q[13][lane];
-    const double A_x_e2_crank = at->Phi_q[14][lane];
-    const double A_x_e3_crank = at->Phi_q[15][lane];
-    const double A_x_e0_rod = at->Phi_q[17][lane];
-    const double A_x_e1_rod = at->Phi_q[18][lane];
-    const double A_x_e2_rod = at->Phi_q[19][lane];
-    const double A_x_e3_rod = at->Phi_q[20][lane];
-    const double A_y_e0_crank = at->Phi_q[22][lane];
-    const double A_y_e1_crank = at->Phi_q[23][lane];
-    const double A_y_e2_crank = at->Phi_q[24][lane];
-    const double A_y_e3_crank = at->Phi_q[25][lane];
     const double A_y_e0_rod = at->Phi_q[27][lane];
     const double A_y_e1_rod = at->Phi_q[28][lane];
     const double A_y_e2_rod = at->Phi_q[29][lane];
     const double A_y_e3_rod = at->Phi_q[30][lane];
-    const double A_z_e0_crank = at->Phi_q[32][lane];
-    const double A_z_e1_crank = at->Phi_q[33][lane];
-    const double A_z_e2_crank = at->Phi_q[34][lane];
-    const double A_z_e3_crank = at->Phi_q[35][lane];
     const double A_z_e0_rod = at->Phi_q[37][lane];
     const double A_z_e1_rod = at->Phi_q[38][lane];
     const double A_z_e2_rod = at->Phi_q[39][lane];
     const double A_z_e3_rod = at->Phi_q[40][lane];
-    const double B_x_e0_rod = at->Phi_q[42][lane];
-    const double B_x_e1_rod = at->Phi_q[43][lane];
-    const double B_x_e2_rod = at->Phi_q[44][lane];
-    const double B_x_e3_rod = at->Phi_q[45][lane];
     const double B_y_e0_rod = at->Phi_q[48][lane];
     const double B_y_e1_rod = at->Phi_q[49][lane];
     const double B_y_e2_rod = at->Phi_q[50][lane];
@@ -1334,10 +1275,6 @@ _always_inline void factor_at(strip *at, size_t lane)
     const double B_cross_e1_rod = at->Phi_q[60][lane];
     const double B_cross_e2_rod = at->Phi_q[61][lane];
     const double B_cross_e3_rod = at->Phi_q[62][lane];
-    const double B_cross_e0_slider = at->Phi_q[63][lane];
-    const double B_cross_e1_slider = at->Phi_q[64][lane];
-    const double B_cross_e2_slider = at->Phi_q[65][lane];
-    const double B_cross_e3_slider = at->Phi_q[66][lane];
     const double C_parallel_f_e0_slider = at->Phi_q[67][lane];
     const double C_parallel_f_e1_slider = at->Phi_q[68][lane];
     const double C_parallel_f_e2_slider = at->Phi_q[69][lane];
@@ -1470,94 +1407,50 @@ _always_inline void factor_at(strip *at, size_t lane)
     const double determinant_5 = k_28 * k_32 - k_29 * k_31;
     const double k_57 = 1.0 / determinant_5;
     const double k_58 = 1.0 / determinant_;
-    at->F[0][lane] = A_x_e0_crank;
-    at->F[1][lane] = A_x_e1_crank;
-    at->F[2][lane] = A_x_e2_crank;
-    at->F[3][lane] = A_x_e3_crank;
-    at->F[4][lane] = A_x_e0_rod;
-    at->F[5][lane] = A_x_e1_rod;
-    at->F[6][lane] = A_x_e2_rod;
-    at->F[7][lane] = A_x_e3_rod;
-    at->F[8][lane] = A_y_e0_crank;
-    at->F[9][lane] = A_y_e1_crank;
-    at->F[10][lane] = A_y_e2_crank;
-    at->F[11][lane] = A_y_e3_crank;
-    at->F[12][lane] = A_z_e0_crank;
-    at->F[13][lane] = A_z_e1_crank;
-    at->F[14][lane] = A_z_e2_crank;
-    at->F[15][lane] = A_z_e3_crank;
-    at->F[16][lane] = B_x_e0_rod;
-    at->F[17][lane] = B_x_e1_rod;
-    at->F[18][lane] = B_x_e2_rod;
-    at->F[19][lane] = B_x_e3_rod;
-    at->F[20][lane] = B_y_e0_rod;
-    at->F[21][lane] = B_y_e1_rod;
-    at->F[22][lane] = B_y_e2_rod;
-    at->F[23][lane] = B_y_e3_rod;
-    at->F[24][lane] = B_z_e0_rod;
-    at->F[25][lane] = B_z_e1_rod;
-    at->F[26][lane] = B_z_e2_rod;
-    at->F[27][lane] = B_z_e3_rod;
-    at->F[28][lane] = B_cross_e0_slider;
-    at->F[29][lane] = B_cross_e1_slider;
-    at->F[30][lane] = B_cross_e2_slider;
-    at->F[31][lane] = B_cross_e3_slider;
-    at->F[32][lane] = norm_crank_e0_crank;
-    at->F[33][lane] = norm_crank_e1_crank;
-    at->F[34][lane] = norm_crank_e2_crank;
-    at->F[35][lane] = norm_crank_e3_crank;
-    at->F[36][lane] = norm_rod_e0_rod;
-    at->F[37][lane] = norm_rod_e1_rod;
-    at->F[38][lane] = norm_rod_e2_rod;
-    at->F[39][lane] = norm_rod_e3_rod;
-    at->F[40][lane] = norm_slider_e0_slider;
-    at->F[41][lane] = norm_slider_e1_slider;
-    at->F[42][lane] = norm_slider_e2_slider;
-    at->F[43][lane] = norm_slider_e3_slider;
-    at->F[44][lane] = k_9;
-    at->F[45][lane] = k_10;
-    at->F[46][lane] = k_11;
-    at->F[47][lane] = k_12;
-    at->F[48][lane] = k_13;
-    at->F[49][lane] = k_14;
-    at->F[50][lane] = k_15;
-    at->F[51][lane] = k_16;
-    at->F[52][lane] = k_17;
-    at->F[53][lane] = k_18;
-    at->F[54][lane] = k_19;
-    at->F[55][lane] = k_20;
-    at->F[56][lane] = k_22;
-    at->F[57][lane] = k_23;
-    at->F[58][lane] = k_24;
-    at->F[59][lane] = k_25;
-    at->F[60][lane] = k_26;
-    at->F[61][lane] = k_27;
-    at->F[62][lane] = k_28;
-    at->F[63][lane] = k_29;
-    at->F[64][lane] = k_30;
-    at->F[65][lane] = k_31;
-    at->F[66][lane] = k_32;
-    at->F[67][lane] = k_33;
-    at->F[68][lane] = k_34;
-    at->F[69][lane] = k_36;
-    at->F[70][lane] = k_37;
-    at->F[71][lane] = k_38;
-    at->F[72][lane] = k_39;
-    at->F[73][lane] = k_40;
-    at->F[74][lane] = k_41;
-    at->F[75][lane] = k_42;
-    at->F[76][lane] = k_43;
-    at->F[77][lane] = k_44;
-    at->F[78][lane] = k_45;
-    at->F[79][lane] = k_46;
-    at->F[80][lane] = k_47;
-    at->F[81][lane] = k_48;
-    at->F[82][lane] = k_51;
-    at->F[83][lane] = k_53;
-    at->F[84][lane] = k_54;
-    at->F[85][lane] = k_55;
-    at->F[86][lane] = k_57;
-    at->F[87][lane] = k_58;
+    at->F[0][lane] = k_9;
+    at->F[1][lane] = k_10;
+    at->F[2][lane] = k_11;
+    at->F[3][lane] = k_12;
+    at->F[4][lane] = k_13;
+    at->F[5][lane] = k_14;
+    at->F[6][lane] = k_15;
+    at->F[7][lane] = k_16;
+    at->F[8][lane] = k_17;
+    at->F[9][lane] = k_18;
+    at->F[10][lane] = k_19;
+    at->F[11][lane] = k_20;
+    at->F[12][lane] = k_22;
+    at->F[13][lane] = k_23;
+    at->F[14][lane] = k_24;
+    at->F[15][lane] = k_25;
+    at->F[16][lane] = k_26;
+    at->F[17][lane] = k_27;
+    at->F[18][lane] = k_28;
+    at->F[19][lane] = k_29;
+    at->F[20][lane] = k_30;
+    at->F[21][lane] = k_31;
+    at->F[22][lane] = k_32;
+    at->F[23][lane] = k_33;
+    at->F[24][lane] = k_34;
+    at->F[25][lane] = k_36;
+    at->F[26][lane] = k_37;
+    at->F[27][lane] = k_38;
+    at->F[28][lane] = k_39;
+    at->F[29][lane] = k_40;
+    at->F[30][lane] = k_41;
+    at->F[31][lane] = k_42;
+    at->F[32][lane] = k_43;
+    at->F[33][lane] = k_44;
+    at->F[34][lane] = k_45;
+    at->F[35][lane] = k_46;
+    at->F[36][lane] = k_47;
+    at->F[37][lane] = k_48;
+    at->F[38][lane] = k_51;
+    at->F[39][lane] = k_53;
+    at->F[40][lane] = k_54;
+    at->F[41][lane] = k_55;
+    at->F[42][lane] = k_57;
+    at->F[43][lane] = k_58;
     at->determinants[0][lane] = determinant_3;
     at->determinants[1][lane] = determinant_4;
     at->determinants[2][lane] = determinant;
@@ -1574,97 +1467,99 @@ static void factor_of_strip(strip *at, size_t count)
 }
 
 // x of Phi_q x = right.
-_always_inline void solve_at(double (*restrict F)[LANES],
-    double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)
+_always_inline void solve_at(double (*restrict Phi_q)[LANES],
+    double (*restrict F)[LANES], double (*restrict right)[LANES],
+    double (*restrict to)[LANES], size_t lane)
 {
-    const double A_x_e0_crank = F[0][lane];
-    const double A_x_e1_crank = F[1][lane];
-    const double A_x_e2_crank = F[2][lane];
-    const double A_x_e3_crank = F[3][lane];
-    const double A_x_e0_rod = F[4][lane];
-    const double A_x_e1_rod = F[5][lane];
-    const double A_x_e2_rod = F[6][lane];
-    const double A_x_e3_rod = F[7][lane];
-    const double A_y_e0_crank = F[8][lane];
-    const double A_y_e1_crank = F[9][lane];
-    const double A_y_e2_crank = F[10][lane];
-    const double A_y_e3_crank = F[11][lane];
-    const double A_z_e0_crank = F[12][lane];
-    const double A_z_e1_crank = F[13][lane];
-    const double A_z_e2_crank = F[14][lane];
-    const double A_z_e3_crank = F[15][lane];
-    const double B_x_e0_rod = F[16][lane];
-    const double B_x_e1_rod = F[17][lane];
-    const double B_x_e2_rod = F[18][lane];
-    const double B_x_e3_rod = F[19][lane];
-    const double B_y_e0_rod = F[20][lane];
-    const double B_y_e1_rod = F[21][lane];
-    const double B_y_e2_rod = F[22][lane];
-    const double B_y_e3_rod = F[23][lane];
-    const double B_z_e0_rod = F[24][lane];
-    const double B_z_e1_rod = F[25][lane];
-    const double B_z_e2_rod = F[26][lane];
-    const double B_z_e3_rod = F[27][lane];
-    const double B_cross_e0_slider = F[28][lane];
-    const double B_cross_e1_slider = F[29][lane];
-    const double B_cross_e2_slider = F[30][lane];
-    const double B_cross_e3_slider = F[31][lane];
-    const double norm_crank_e0_crank = F[32][lane];
-    const double norm_crank_e1_crank = F[33][lane];
-    const double norm_crank_e2_crank = F[34][lane];
-    const double norm_crank_e3_crank = F[35][lane];
-    const double norm_rod_e0_rod = F[36][lane];
-    const double norm_rod_e1_rod = F[37][lane];
-    const double norm_rod_e2_rod = F[38][lane];
-    const double norm_rod_e3_rod = F[39][lane];
-    const double norm_slider_e0_slider = F[40][lane];
-    const double norm_slider_e1_slider = F[41][lane];
-    const double norm_slider_e2_slider = F[42][lane];
-    const double norm_slider_e3_slider = F[43][lane];
-    const double k_9 = F[44][lane];
-    const double k_10 = F[45][lane];
-    const double k_11 = F[46][lane];
-    const double k_12 = F[47][lane];
-    const double k_13 = F[48][lane];
-    const double k_14 = F[49][lane];
-    const double k_15 = F[50][lane];
-    const double k_16 = F[51][lane];
-    const double k_17 = F[52][lane];
-    const double k_18 = F[53][lane];
-    const double k_19 = F[54][lane];
-    const double k_20 = F[55][lane];
-    const double k_22 = F[56][lane];
-    const double k_23 = F[57][lane];
-    const double k_24 = F[58][lane];
-    const double k_25 = F[59][lane];
-    const double k_26 = F[60][lane];
-    const double k_27 = F[61][lane];
-    const double k_28 = F[62][lane];
-    const double k_29 = F[63][lane];
-    const double k_30 = F[64][lane];
-    const double k_31 = F[65][lane];
-    const double k_32 = F[66][lane];
-    const double k_33 = F[67][lane];
-    const double k_34 = F[68][lane];
-    const double k_36 = F[69][lane];
-    const double k_37 = F[70][lane];
-    const double k_38 = F[71][lane];
-    const double k_39 = F[72][lane];
-    const double k_40 = F[73][lane];
-    const double k_41 = F[74][lane];
-    const double k_42 = F[75][lane];
-    const double k_43 = F[76][lane];
-    const double k_44 = F[77][lane];
-    const double k_45 = F[78][lane];
-    const double k_46 = F[79][lane];
-    const double k_47 = F[80][lane];
-    const double k_48 = F[81][lane];
-    const double k_51 = F[82][lane];
-    const double k_53 = F[83][lane];
-    const double k_54 = F[84][lane];
-    const double k_55 = F[85][lane];
-    const double k_57 = F[86][lane];
-    const double k_58 = F[87][lane];
+    (void)Phi_q, (void)F;
+    const double A_x_e0_crank = Phi_q[12][lane];
+    const double A_x_e1_crank = Phi_q[13][lane];
+    const double A_x_e2_crank = Phi_q[14][lane];
+    const double A_x_e3_crank = Phi_q[15][lane];
+    const double A_x_e0_rod = Phi_q[17][lane];
+    const double A_x_e1_rod = Phi_q[18][lane];
+    const double A_x_e2_rod = Phi_q[19][lane];
+    const double A_x_e3_rod = Phi_q[20][lane];
+    const double A_y_e0_crank = Phi_q[22][lane];
+    const double A_y_e1_crank = Phi_q[23][lane];
+    const double A_y_e2_crank = Phi_q[24][lane];
+    const double A_y_e3_crank = Phi_q[25][lane];
+    const double A_z_e0_crank = Phi_q[32][lane];
+    const double A_z_e1_crank = Phi_q[33][lane];
+    const double A_z_e2_crank = Phi_q[34][lane];
+    const double A_z_e3_crank = Phi_q[35][lane];
+    const double B_x_e0_rod = Phi_q[42][lane];
+    const double B_x_e1_rod = Phi_q[43][lane];
+    const double B_x_e2_rod = Phi_q[44][lane];
+    const double B_x_e3_rod = Phi_q[45][lane];
+    const double B_y_e0_rod = Phi_q[48][lane];
+    const double B_y_e1_rod = Phi_q[49][lane];
+    const double B_y_e2_rod = Phi_q[50][lane];
+    const double B_y_e3_rod = Phi_q[51][lane];
+    const double B_z_e0_rod = Phi_q[54][lane];
+    const double B_z_e1_rod = Phi_q[55][lane];
+    const double B_z_e2_rod = Phi_q[56][lane];
+    const double B_z_e3_rod = Phi_q[57][lane];
+    const double B_cross_e0_slider = Phi_q[63][lane];
+    const double B_cross_e1_slider = Phi_q[64][lane];
+    const double B_cross_e2_slider = Phi_q[65][lane];
+    const double B_cross_e3_slider = Phi_q[66][lane];
+    const double norm_crank_e0_crank = Phi_q[85][lane];
+    const double norm_crank_e1_crank = Phi_q[86][lane];
+    const double norm_crank_e2_crank = Phi_q[87][lane];
+    const double norm_crank_e3_crank = Phi_q[88][lane];
+    const double norm_rod_e0_rod = Phi_q[89][lane];
+    const double norm_rod_e1_rod = Phi_q[90][lane];
+    const double norm_rod_e2_rod = Phi_q[91][lane];
+    const double norm_rod_e3_rod = Phi_q[92][lane];
+    const double norm_slider_e0_slider = Phi_q[93][lane];
+    const double norm_slider_e1_slider = Phi_q[94][lane];
+    const double norm_slider_e2_slider = Phi_q[95][lane];
+    const double norm_slider_e3_slider = Phi_q[96][lane];
+    const double k_9 = F[0][lane];
+    const double k_10 = F[1][lane];
+    const double k_11 = F[2][lane];
+    const double k_12 = F[3][lane];
+    const double k_13 = F[4][lane];
+    const double k_14 = F[5][lane];
+    const double k_15 = F[6][lane];
+    const double k_16 = F[7][lane];
+    const double k_17 = F[8][lane];
+    const double k_18 = F[9][lane];
+    const double k_19 = F[10][lane];
+    const double k_20 = F[11][lane];
+    const double k_22 = F[12][lane];
+    const double k_23 = F[13][lane];
+    const double k_24 = F[14][lane];
+    const double k_25 = F[15][lane];
+    const double k_26 = F[16][lane];
+    const double k_27 = F[17][lane];
+    const double k_28 = F[18][lane];
+    const double k_29 = F[19][lane];
+    const double k_30 = F[20][lane];
+    const double k_31 = F[21][lane];
+    const double k_32 = F[22][lane];
+    const double k_33 = F[23][lane];
+    const double k_34 = F[24][lane];
+    const double k_36 = F[25][lane];
+    const double k_37 = F[26][lane];
+    const double k_38 = F[27][lane];
+    const double k_39 = F[28][lane];
+    const double k_40 = F[29][lane];
+    const double k_41 = F[30][lane];
+    const double k_42 = F[31][lane];
+    const double k_43 = F[32][lane];
+    const double k_44 = F[33][lane];
+    const double k_45 = F[34][lane];
+    const double k_46 = F[35][lane];
+    const double k_47 = F[36][lane];
+    const double k_48 = F[37][lane];
+    const double k_51 = F[38][lane];
+    const double k_53 = F[39][lane];
+    const double k_54 = F[40][lane];
+    const double k_55 = F[41][lane];
+    const double k_57 = F[42][lane];
+    const double k_58 = F[43][lane];
     const double O_x = right[0][lane];
     const double O_y = right[1][lane];
     const double O_z = right[2][lane];
@@ -1952,17 +1847,17 @@ _always_inline void missed_at(const strip *at, const double (*weight)[LANES],
 }
 
 // No two of these overlap: the loop takes several lanes.
-static void solve_of_strip(double (*restrict F)[LANES], double (*restrict right)[LANES],
-    double (*restrict to)[LANES], size_t count)
+static void solve_of_strip(double (*restrict Phi_q)[LANES], double (*restrict F)[LANES],
+    double (*restrict right)[LANES], double (*restrict to)[LANES], size_t count)
 {
     const size_t all = _abreast(count);
     for (size_t lane = 0; lane < all; lane++)
-        solve_at(F, right, to, lane);
+        solve_at(Phi_q, F, right, to, lane);
 }
 
 // Copy numbers of `count` points, from point `start` on, into rows; what is not finite shows in
 // `check`, which stays 0 otherwise.
-static inline void read_rows(double (*rows)[LANES], size_t size, spatial_slider_crank_input from, size_t start,
+static void read_rows(double (*rows)[LANES], size_t size, spatial_slider_crank_input from, size_t start,
     size_t count, double *check)
 {
     for (size_t i = 0; i < size; i++) {
@@ -2008,7 +1903,7 @@ _always_inline void copy(double *to, const double *from, size_t size, int is_far
 }
 
 // Copy rows to where they are wanted: all of them, or those listed.
-static inline void store_rows(spatial_slider_crank_output to, double (*rows)[LANES], const int *listed, int size,
+static void store_rows(spatial_slider_crank_output to, double (*rows)[LANES], const int *listed, int size,
     size_t start, size_t count, int is_far)
 {
     if (to.first == NULL)
@@ -2079,7 +1974,8 @@ static const quantity QUANTITY[] = {
 };
 enum { QUANTITIES = 8, MATRICES = 525 };
 
-// The kernels, the quantities that each gives, as bits, and the quantities that depend on rates.
+// The kernels, the quantities that each gives, as bits, and the quantities that depend on cosines and
+// sines, and on rates.
 static const struct {
     unsigned gives;
     void (*run)(strip *, size_t);
@@ -2095,11 +1991,18 @@ static const struct {
     {15, kinematics_of_strip},
 #endif
 };
-enum { KERNELS = sizeof KERNEL / sizeof *KERNEL, READS_RATES = 248, READS_SECOND_RATES = 240 };
+enum {
+    KERNELS = sizeof KERNEL / sizeof *KERNEL,
+    READS_ANGLES = 15,
+    READS_RATES = 248,
+    READS_SECOND_RATES = 240,
+};
 
 // Run the first kernel that gives all that is wanted, or as many as it takes.
 static void run_kernels(unsigned wanted, strip *b, size_t count)
 {
+    if (wanted & READS_ANGLES)
+        angles_of_strip(b, count);
     for (int k = 0; k < KERNELS; k++)
         if ((wanted & ~KERNEL[k].gives) == 0) {
             KERNEL[k].run(b, count);
@@ -2156,9 +2059,8 @@ static void place_constants(strip *b, double *matrices, size_t count)
         }
 }
 
-// Write a quantity of a strip of points: as vectors or nonzeros, and as whole matrices. It is called
-// once a quantity, so that a compiler knows the sizes.
-_always_inline void write_quantity(const spatial_slider_crank_batch *batch, const quantity *q, strip *b,
+// Write a quantity of a strip of points: as vectors or nonzeros, and as whole matrices.
+static void write_quantity(const spatial_slider_crank_batch *batch, const quantity *q, strip *b,
     double *matrices, size_t start, size_t count, int is_far)
 {
     const spatial_slider_crank_output whole = output_of(batch, q->result);
@@ -2204,30 +2106,9 @@ int spatial_slider_crank_evaluate(const spatial_slider_crank_batch *batch)
         if (wants_second)
             read_rows(b.q_ddot, N, batch->q_ddot, start, count, check);
         run_kernels(wanted, &b, count);
-        if (wanted & 1)
-            write_quantity(batch, &QUANTITY[0], &b, matrices, start, count,
-                is_far);
-        if (wanted & 2)
-            write_quantity(batch, &QUANTITY[1], &b, matrices, start, count,
-                is_far);
-        if (wanted & 4)
-            write_quantity(batch, &QUANTITY[2], &b, matrices, start, count,
-                is_far);
-        if (wanted & 8)
-            write_quantity(batch, &QUANTITY[3], &b, matrices, start, count,
-                is_far);
-        if (wanted & 16)
-            write_quantity(batch, &QUANTITY[4], &b, matrices, start, count,
-                is_far);
-        if (wanted & 32)
-            write_quantity(batch, &QUANTITY[5], &b, matrices, start, count,
-                is_far);
-        if (wanted & 64)
-            write_quantity(batch, &QUANTITY[6], &b, matrices, start, count,
-                is_far);
-        if (wanted & 128)
-            write_quantity(batch, &QUANTITY[7], &b, matrices, start, count,
-                is_far);
+        for (int k = 0; k < QUANTITIES; k++)
+            if (wanted & 1u << k)
+                write_quantity(batch, &QUANTITY[k], &b, matrices, start, count, is_far);
     }
 #ifdef __x86_64__
     if (is_far)
@@ -2251,7 +2132,7 @@ void spatial_slider_crank_solve(const spatial_slider_crank_system *system)
         read_rows(b.Phi_q, NONZEROS, system->nonzeros, start, count, check);
         read_rows(right, M, system->b, start, count, check);
         factor_of_strip(&b, count);
-        solve_of_strip(b.F, right, x, count);
+        solve_of_strip(b.Phi_q, b.F, right, x, count);
         store_rows(system->x, x, NULL, N, start, count, 0);
     }
 }
@@ -2334,13 +2215,20 @@ typedef struct {
     double ends[K > 0 ? K : 1];
 } state;
 
+// Nothing but parameter sets is led along lines.
+#ifdef _WITHOUT_SETS
+#define _is_led(points) 0
+#else
+#define _is_led(points) (points)->on.is_led
+#endif
+
 // Take up a lane of a strip as a good point.
 static void take_up(state *at, const strip *b, size_t k)
 {
     for (int i = 0; i < ROWS; i++)
         (&at->t)[i] = ((const double *)b)[i * LANES + (int)k];
     at->on.is_led = b->on.is_led;
-    if (b->on.is_led) {
+    if (_is_led(b)) {
         at->on = b->on;
         for (int i = 0; i < K; i++)
             at->ends[i] = b->ends[i][k];
@@ -2354,7 +2242,7 @@ static void put_at(strip *b, const state *at, size_t first, size_t end)
         for (size_t k = first; k < end; k++)
             ((double *)b)[(size_t)i * LANES + k] = (&at->t)[i];
     b->on.is_led = at->on.is_led;
-    if (at->on.is_led) {
+    if (_is_led(at)) {
         b->on = at->on;
         for (int i = 0; i < K; i++)
             for (size_t k = first; k < end; k++)
@@ -2367,7 +2255,7 @@ static void keep(strip *to, const strip *b)
 {
     memcpy(to, b, ROWS * sizeof b->t);
     to->on.is_led = b->on.is_led;
-    if (b->on.is_led) {
+    if (_is_led(b)) {
         to->on = b->on;
         memcpy(to->ends, b->ends, sizeof b->ends);
     }
@@ -2407,34 +2295,42 @@ static void put_beside(strip *to, const strip *b, double part, size_t count)
         to->t[k] = b->on.t;
 }
 
-// The kernels of points that may be on lines.
+// Phi and Phi_q at points that have come elsewhere. The cosines and sines are then those of nu and
+// gamma too.
+static void position_afresh(strip *b, size_t count)
+{
+    angles_of_strip(b, count);
+    position_of_strip(b, count);
+}
+
+// The kernels of points that may be on lines, of which position is the first where a point is.
 _never_inline void position_on_line(strip *b, size_t count)
 {
     double part[LANES];
-    if (!b->on.is_led) {
-        position_of_strip(b, count);
+    if (!_is_led(b)) {
+        position_afresh(b, count);
         return;
     }
     memcpy(part, b->t, count * sizeof *part);
     put_beside(b, b, 0.0, count);
-    position_of_strip(b, count);
+    position_afresh(b, count);
     memcpy(b->t, part, count * sizeof *part);
 }
 
 _never_inline void nu_on_line(strip *b, size_t count)
 {
     const size_t all = _abreast(count);
-    if (!b->on.is_led) {
+    if (!_is_led(b)) {
         nu_of_strip(b, count);
         return;
     }
     strip beside;
     memcpy(beside.q, b->q, sizeof b->q);
     put_beside(&beside, b, -FIRST_DIFFERENCE, count);
-    position_of_strip(&beside, count);
+    position_afresh(&beside, count);
     memcpy(b->nu, beside.Phi, sizeof b->nu);
     put_beside(&beside, b, FIRST_DIFFERENCE, count);
-    position_of_strip(&beside, count);
+    position_afresh(&beside, count);
     for (int i = 0; i < M; i++)
         for (size_t k = 0; k < all; k++)
             b->nu[i][k] = (b->nu[i][k] - beside.Phi[i][k]) / (2 * FIRST_DIFFERENCE);
@@ -2443,7 +2339,7 @@ _never_inline void nu_on_line(strip *b, size_t count)
 _never_inline void gamma_on_line(strip *b, size_t count)
 {
     const size_t all = _abreast(count);
-    if (!b->on.is_led) {
+    if (!_is_led(b)) {
         gamma_of_strip(b, count);
         return;
     }
@@ -2457,7 +2353,7 @@ _never_inline void gamma_on_line(strip *b, size_t count)
             for (size_t k = 0; k < all; k++)
                 beside.q[i][k] = b->q[i][k] + part * b->q_dot[i][k];
         put_beside(&beside, b, part, count);
-        position_of_strip(&beside, count);
+        position_afresh(&beside, count);
         for (int i = 0; i < M; i++)
             for (size_t k = 0; k < all; k++)
                 b->gamma[i][k] -= beside.Phi[i][k];
@@ -2472,7 +2368,7 @@ static void missed_of_strip(const strip *b, const double (*weight)[LANES],
     double *restrict by_velocity, double *restrict by_acceleration, size_t count)
 {
     const size_t all = _abreast(count);
-    if (!b->on.is_led) {
+    if (!_is_led(b)) {
         for (size_t k = 0; k < all; k++)
             missed_at(b, weight, &by_velocity[k], &by_acceleration[k], k);
         return;
@@ -2599,7 +2495,7 @@ static void correct(strip *b, const scales *s, int most, outcome *o, size_t lane
         position_on_line(b, lanes);
         factor_of_strip(b, lanes);
         double change[N][LANES];
-        solve_of_strip(b->F, b->Phi, change, lanes);
+        solve_of_strip(b->Phi_q, b->F, b->Phi, change, lanes);
         for (int i = 0; i < N; i++)
             for (size_t lane = 0; lane < all; lane++) {
                 b->q[i][lane] -= going[lane] != 0 ? change[i][lane] : 0.0;
@@ -2647,11 +2543,11 @@ static void complete(strip *b, const scales *s, outcome *o, size_t lanes)
         }
     // A third right side, of the size of the equations' terms, shows how near to singular Phi_q is.
     double answer[N][LANES];
-    solve_of_strip(b->F, right, answer, lanes);
+    solve_of_strip(b->Phi_q, b->F, right, answer, lanes);
     nu_on_line(b, lanes);
-    solve_of_strip(b->F, b->nu, b->q_dot, lanes);
+    solve_of_strip(b->Phi_q, b->F, b->nu, b->q_dot, lanes);
     gamma_on_line(b, lanes);
-    solve_of_strip(b->F, b->gamma, b->q_ddot, lanes);
+    solve_of_strip(b->Phi_q, b->F, b->gamma, b->q_ddot, lanes);
     for (int i = 0; i < N; i++)
         for (size_t lane = 0; lane < all; lane++) {
             const double moved = fabs(answer[i][lane]) * s->inverse[i][lane];

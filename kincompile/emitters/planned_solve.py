@@ -39,12 +39,17 @@ class SolveListing:
     factor_steps: tuple[Assignment | BlockCall, ...]
     solve_steps: tuple[Assignment | BlockCall, ...]
     names: Mapping[int, str]  # names of all nodes that have one
+    # Entries of Phi_q that the solution reads themselves: node, and place in the pattern.
+    entries: tuple[tuple[int, int], ...] = ()
 
 
-def schedule_solve(code: InlineProgram, reserved: Collection[str]) -> SolveListing | None:
+def schedule_solve(
+    code: InlineProgram, reserved: Collection[str], *, reads_entries: bool = False
+) -> SolveListing | None:
     """Arrange the planned solve, if there is one: what depends on Phi_q alone is computed once.
 
     `reserved` are names that the target uses; those of coordinates and equations are free here.
+    Where the solution reads entries of Phi_q, these are not kept among the factors.
     """
     plan, table = plan_solve(code), NameTable(reserved)
     if plan is None:
@@ -59,14 +64,19 @@ def schedule_solve(code: InlineProgram, reserved: Collection[str]) -> SolveListi
     labels = dict.fromkeys(plan.determinants, "determinant")
     labels |= zip(plan.solution, coordinates, strict=True)
     variable = depending_on(plan.nodes, plan.right)
-    factors = _factors(plan, variable)
+    factors, entries = _factors(plan, variable), tuple[tuple[int, int], ...]()
+    if reads_entries:
+        places = {place: k for k, place in enumerate(code.pattern())}
+        inputs = {node: places[row, column] for row, column, node in plan.entries}
+        entries = tuple((node, inputs[node]) for node in factors if node in inputs)
+        factors = tuple(node for node in factors if node not in inputs)
     blocks = {node for node, content in enumerate(plan.nodes) if content[0] == "linear"}
     scheduler = Scheduler(plan.nodes, labels, names, table, labels, {*labels, *factors, *blocks})
     needed = sorted(scheduler.uses)
     kept = scheduler.assign("k", [node for node in needed if node not in variable])
     solved = scheduler.assign("b", [node for node in needed if node in variable])
     return SolveListing(
-        plan, factors, _calls(plan, kept, names), _calls(plan, solved, names), names
+        plan, factors, _calls(plan, kept, names), _calls(plan, solved, names), names, entries
     )
 
 

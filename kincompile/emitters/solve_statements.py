@@ -65,10 +65,14 @@ def factorization(
 
 
 def solution(write: Statements, listing: SolveListing, printer: Printer, call: Call) -> list[str]:
-    """Return the statements that take F and `right` to `to`, x of Phi_q x = right."""
+    """Return the statements that take F and `right` to `to`, x of Phi_q x = right.
+
+    Entries of Phi_q that are not in F are read by themselves, in the order of the pattern.
+    """
     plan, names = listing.plan, listing.names
     read = count_uses(plan.nodes, plan.solution)
-    given = [(node, "F", k) for k, node in enumerate(listing.factors)]
+    given = [(node, "Phi_q", k) for node, k in listing.entries]
+    given += [(node, "F", k) for k, node in enumerate(listing.factors)]
     given += [(node, "right", k) for k, node in enumerate(plan.right) if node in read]
     lines = []
     for node, vector, k in given:

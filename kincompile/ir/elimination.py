@@ -456,6 +456,8 @@ def _pivoted(graph: Graph, a: list[list[int]], b: list[int]) -> tuple[list[int],
     inverses = []
     for k in range(size):
         for i in range(k + 1, size):
+            if graph.value_of(a[i][k]) == 0:
+                continue  # never larger
             is_larger = graph.compare("<", graph.square(a[k][k]), graph.square(a[i][k]))
             choose = partial(graph.select, is_larger)
             pairs = [(choose(y, x), choose(x, y)) for x, y in zip(a[k][k:], a[i][k:], strict=True)]

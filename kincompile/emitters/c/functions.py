@@ -12,7 +12,7 @@ from kincompile.emitters.printer import ELEMENTARY, Dialect, Printer
 from kincompile.emitters.solve_statements import factorization, operands, solution
 from kincompile.emitters.statements import Statements
 from kincompile.ir.graph import Graph, reachable
-from kincompile.quantities import quantity_named
+from kincompile.quantities import TOGETHER, quantity_named
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -52,31 +52,49 @@ ABOUT = {
 }
 """What the kernels of several quantities give."""
 
+OF_ALL = TOGETHER["kinematics"]
+"""The quantities whose cosines and sines are computed in one pass."""
+
 CIRCULAR = ("cos", "sin")
 """Functions of an angle whose fast form does not reach all angles."""
 
 
 def evaluator(name: str, code: InlineProgram, listing: Listing, printer: Printer) -> list[str]:
-    """Return a function that evaluates quantities at a point, and the one for a strip."""
-    places = places_of_angles(code, _results(listing))
-    head = ["", f"// {ABOUT.get(name) or quantity_named(name).about}"]
-    if not places:
-        return [*head, *_plain(name, WRITE.evaluation(code, listing, printer))]
+    """Return a function that evaluates quantities at a point, and the one for a strip.
+
+    Before it stands the pass over the angles: one for all quantities of kinematics, which others
+    have too where it is all they need.
+    """
+    given = [quantity for quantity, _ in listing.results]
+    own, places = angles_of(code, given), places_of_angles(code)
     nodes = list(code.nodes)
-    for node, k in places.items():
-        nodes[node] = ("input", f"at->of_angles[{k}][lane]")
-    names = {node: name for node, name in listing.names.items() if node not in places}
-    angles = _angles(code, listing, places, nodes, _Printer(C, nodes, names, code.program.name))
+    for node in own:
+        nodes[node] = ("input", f"at->of_angles[{places[node]}][lane]")
     rest = _only(listing, nodes, _results(listing))
     body = WRITE.evaluation(code, rest, _Printer(C, nodes, listing.names, code.program.name))
-    return [*head, *_angles_at(name, angles), "", *_point_function(name, body), "", *_both(name)]
+    about = ABOUT.get(name) or quantity_named(name).about
+    point = ["", f"// {about}", *_point_function(name, body)]
+    if name != "kinematics" and own <= angles_of(code, OF_ALL):
+        return [*point, "", *_strip_function(name)]
+    names = {node: name for node, name in listing.names.items() if node not in own}
+    printer = _Printer(C, nodes, names, code.program.name)
+    angles = _angles(code, listing, sorted(own), nodes, printer)
+    if name == "kinematics":
+        return [*_pass("angles", angles), *point, "", *_strip_function(name)]
+    before = f"    angles_of_{name}_of_strip(at, count);"
+    return [*_pass(f"angles_of_{name}", angles), *point, "", *_strip_function(name, before)]
 
 
-def places_of_angles(code: InlineProgram, wanted: Iterable[int]) -> dict[int, int]:
-    """Return the cosines and sines that some nodes depend on, and where each is kept."""
-    used = reachable(code.nodes, wanted)
-    calls = (x for x in used if code.nodes[x][0] == "call" and code.nodes[x][1] in CIRCULAR)
-    return {node: k for k, node in enumerate(sorted(calls))}
+def angles_of(code: InlineProgram, given: Iterable[str]) -> set[int]:
+    """Return the cosines and sines that quantities depend on."""
+    used = reachable(code.nodes, [x.node for quantity in given for x in code.entries(quantity)])
+    return places_of_angles(code).keys() & used
+
+
+def places_of_angles(code: InlineProgram) -> dict[int, int]:
+    """Return all cosines and sines, and where each is kept."""
+    calls = (k for k, x in enumerate(code.nodes) if x[0] == "call" and x[1] in CIRCULAR)
+    return {node: k for k, node in enumerate(calls)}
 
 
 class _Printer(Printer):
@@ -141,10 +159,6 @@ def _angles(
     return lines
 
 
-def _plain(name: str, body: list[str]) -> list[str]:
-    return [*_point_function(name, body), "", *_strip_function(name)]
-
-
 def _point_function(name: str, body: list[str]) -> list[str]:
     # A function of a whole point that is constant, or has no entry that varies, is possible.
     used = any("[lane]" in line for line in body)
@@ -152,32 +166,32 @@ def _point_function(name: str, body: list[str]) -> list[str]:
     return braced(head, body if used else ["(void)at, (void)lane;"])
 
 
-def _angles_at(name: str, body: list[str]) -> list[str]:
-    head = [f"_always_inline int64_t {name}_angles_at(strip *at, size_t lane, int exact)", "{"]
-    return braced(head, ["int64_t far = 0;", *body, "return far;"])
+def _pass(name: str, body: list[str]) -> list[str]:
+    """Return the functions that take cosines and sines of a point, and of a strip.
 
-
-def _both(name: str) -> list[str]:
-    """Return the function for a strip. What is large is compiled once, whatever the angles are."""
-    return [
+    What comes after them is compiled once, whatever the angles are.
+    """
+    head = [f"_always_inline int64_t {name}_at(strip *at, size_t lane, int exact)", "{"]
+    start = ["", "// Cosines and sines.", *braced(head, ["int64_t far = 0;", *body, "return far;"])]
+    whole = [
         f"static void {name}_of_strip(strip *at, size_t count)",
         "{",
         "    int64_t far = 0;",
         "    const size_t all = _abreast(count);",
         "    for (size_t lane = 0; lane < all; lane++)",
-        f"        far |= {name}_angles_at(at, lane, 0) & -(int64_t)(lane < count);",
+        f"        far |= {name}_at(at, lane, 0) & -(int64_t)(lane < count);",
         "    for (size_t lane = 0; far && lane < count; lane++)",
-        f"        {name}_angles_at(at, lane, 1);",
-        "    for (size_t lane = 0; lane < all; lane++)",
-        f"        {name}_at(at, lane);",
+        f"        {name}_at(at, lane, 1);",
         "}",
     ]
+    return [*start, "", *whole] if body else []
 
 
-def _strip_function(name: str) -> list[str]:
+def _strip_function(name: str, *before: str) -> list[str]:
     return [
         f"static void {name}_of_strip(strip *at, size_t count)",
         "{",
+        *before,
         "    const size_t all = _abreast(count);",
         "    for (size_t lane = 0; lane < all; lane++)",
         f"        {name}_at(at, lane);",
@@ -190,12 +204,14 @@ def solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     printer = Printer(C, listing.plan.nodes, listing.names)
     body = solution(replace(WRITE, element="{}[{}][lane]"), listing, printer, block_call)
     head = [
-        "_always_inline void solve_at(double (*restrict F)[LANES],",
-        "    double (*restrict right)[LANES], double (*restrict to)[LANES], size_t lane)",
+        "_always_inline void solve_at(double (*restrict Phi_q)[LANES],",
+        "    double (*restrict F)[LANES], double (*restrict right)[LANES],",
+        "    double (*restrict to)[LANES], size_t lane)",
         "{",
     ]
-    solve = braced(head, body if listing.factors else ["(void)F;", *body])
-    factor = _plain("factor", factorization(WRITE, code, listing, printer, block_call))
+    solve = braced(head, ["(void)Phi_q, (void)F;", *body])
+    body = factorization(WRITE, code, listing, printer, block_call)
+    factor = [*_point_function("factor", body), "", *_strip_function("factor")]
     return [
         *solve_statements.solve_functions(code, listing, factor, solve),
         "",

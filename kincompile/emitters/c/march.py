@@ -249,7 +249,8 @@ class CSolver(SolverPrinter):
             case Call("row" | "rows"):
                 return []
             case Call("solve", (Name() as point, right)):
-                given = [f"{point.variable.name}{self.arrow(point)}F", self.place(right), into]
+                owner = f"{point.variable.name}{self.arrow(point)}"
+                given = [f"{owner}Phi_q", f"{owner}F", self.place(right), into]
                 given += ["lanes"] * self.has_lanes
                 return [f"{self.kernel('solve')}({', '.join(given)});"]
             case Constant():

@@ -174,7 +174,7 @@ class Target:
         self, code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
     ) -> Mapping[str, str]:
         """Return the source and the header."""
-        program, listing = code.program, schedule_solve(code, self.RESERVED)
+        program, listing = code.program, schedule_solve(code, self.RESERVED, reads_entries=True)
         assert listing is not None
         lines = [x for own in functions.values() for x in own] + _solve_functions(code, listing)
         sizes = _sizes(code, listing)
@@ -211,7 +211,7 @@ class Target:
 
     def needs(self, code: InlineProgram) -> str:
         """Return how large a state is, and what a step takes."""
-        listing = schedule_solve(code, self.RESERVED)
+        listing = schedule_solve(code, self.RESERVED, reads_entries=True)
         assert listing is not None
         sizes, plan = _sizes(code, listing), listing.plan
         found = [x.node for name in ("Phi", "Phi_q") for x in code.entries(name)]
@@ -298,10 +298,14 @@ def _solve_functions(code: InlineProgram, listing: SolveListing) -> list[str]:
     body = solution(replace(WRITE_ONE, element="{}[{}]"), listing, printer, block_call)
     factors = factorization(WRITE_ONE, code, listing, printer, block_call)
     head = [f"static void factor_at({code.program.name}_point *at)", "{"]
-    solve = ["static void solve_at(const double *F, const double *right, double *to)", "{"]
+    solve = [
+        "static void solve_at(const double *Phi_q, const double *F, const double *right,",
+        "    double *to)",
+        "{",
+    ]
     return solve_functions(
         code,
         listing,
         braced(head, factors or ["(void)at;"]),
-        braced(solve, body if listing.factors else ["(void)F;", *body]),
+        braced(solve, ["(void)Phi_q, (void)F;", *body]),
     )

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from kincompile import quantities
 from kincompile.emitters.c.functions import (
+    OF_ALL,
     WRITE,
     C,
+    angles_of,
     evaluator,
     places_of_angles,
     solve_functions,
@@ -55,7 +57,7 @@ KEYWORDS = (
 underscore, as no name of a user does."""
 
 RESERVED: tuple[str, ...] = (
-    *KEYWORDS, "at", "lane", "t", "far", "exact", "F", "right", "to",
+    *KEYWORDS, "at", "lane", "t", "far", "exact", "Phi_q", "F", "right", "to",
     "square", "angle_of", "cos_sin", "cosine", "sine", "spline", "block_solve", "block_determinant",
     "fabs", "fmax", *ELEMENTARY,
 )  # fmt: skip
@@ -74,13 +76,14 @@ def files(
     code: InlineProgram, functions: Mapping[str, list[str]], called: Collection[str]
 ) -> Mapping[str, str]:
     """Return the source and the header."""
-    program, listing = code.program, schedule_solve(code, RESERVED)
+    program, listing = code.program, schedule_solve(code, RESERVED, reads_entries=True)
     about = _about(code, listing)
     lines = [line for own in functions.values() for line in own]
-    body = [_strip(code, lines, called, listing)]
-    body.append(fill("c/batch.c.jinja", {**_only(about, "name", "is_planned"), **_batch(code)}))
+    body, batch = [_strip(code, lines, called, listing)], _batch(code)
+    body.append(fill("c/batch.c.jinja", {**_only(about, "name", "is_planned"), **batch}))
     if listing is not None:
-        body.append(fill("c/march.c.jinja", {**_only(about, "name", "NAME"), **_march(program)}))
+        march = {**_only(about, "name", "NAME"), **_only(batch, "reads_angles"), **_march(program)}
+        body.append(fill("c/march.c.jinja", march))
     data = {**_without(about, "NAME"), **_tables(code, listing), "body": "".join(body)}
     source = fill("c/module.c.jinja", data)
     guard = f"{program.name.upper()}_H"
@@ -182,19 +185,12 @@ def _batch(code: InlineProgram) -> dict[str, Any]:
         name: f"{{{sum(bits[item] for item in given)}, {name}_of_strip}},"
         for name, given in quantities.kernels(program.quantities).items()
     }
+    shared, found = angles_of(code, OF_ALL), {x: angles_of(code, [x]) for x in bits}
     return {
         "quantities": indented(rows),
         "n_quantities": len(bits),
-        "writes": indented(
-            line
-            for k, bit in enumerate(bits.values())
-            for line in (
-                f"    if (wanted & {bit})",
-                f"        write_quantity(batch, &QUANTITY[{k}], &b, matrices, start, count,",
-                "            is_far);",
-            )
-        ),
         "matrices": max(matrices, 1),
+        "reads_angles": sum(bits[x] for x, own in found.items() if own and own <= shared),
         "kinematics": indented([kernels.pop("kinematics")]),
         "kernels": indented(kernels.values()),
         **{
@@ -248,10 +244,9 @@ def _strip(
     if listing is not None:
         lines = [*lines, *solve_functions(code, listing)]
         largest = largest_block(listing)
-    entries = [x.node for item in code.program.quantities for x in code.entries(item.name)]
     data = {
         "is_planned": listing is not None,
-        "n_angles": len(places_of_angles(code, entries)),
+        "n_angles": len(places_of_angles(code)),
         "elementary": elementary(code.program, called, largest),
         "functions": "\n".join(lines),
         "results": indented(

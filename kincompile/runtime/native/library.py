@@ -50,7 +50,8 @@ OWN = ("-D_WITHOUT_START",)
 QUICK = (
     "-O2", "-D_WHOLE_REGISTERS", "-ftree-vectorize", "-fvect-cost-model", "-funswitch-loops",
     "-fno-tree-pre", "-fno-tree-vrp", "-fno-tree-dominator-opts", "-fno-thread-jumps",
-    "-fno-rerun-cse-after-loop", "-fno-cse-follow-jumps",
+    "-fno-rerun-cse-after-loop", "-fno-cse-follow-jumps", "-fno-code-hoisting",
+    "-fno-predictive-commoning",
 )  # fmt: skip
 """Loops over points take several at once, as with -O3, for which gcc takes up to twice as long.
 Passes that look for what is computed twice are left out: emitted code has none of it, and gcc takes

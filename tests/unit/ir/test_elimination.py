@@ -1,6 +1,7 @@
 """The planned solve: small blocks for mechanisms, and right for any system it accepts."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ from hypothesis import strategies as st
 import kincompile as kc
 from kincompile.errors import StructuralError
 from kincompile.ir.elimination import plan_solve
+from kincompile.ir.graph import number_of
 from kincompile.ir.inline import inline
 from kincompile.ir.lower import lower
+from kincompile.ir.redundancy import redundant_equations
 
 
 @pytest.mark.parametrize(
@@ -127,3 +130,18 @@ def test_that_a_system_with_too_few_equations_has_no_plan() -> None:
     assert plan_solve(inline(lower(system))) is None
     with pytest.raises(StructuralError):
         kc.solve(kc.compile(system), 0)
+
+
+def test_that_rows_without_a_term_are_not_compared_for_the_pivot(
+    example_named: Callable[[str], Any],
+) -> None:
+    """In a block whose rows change places a zero is never the largest."""
+    system = example_named("bennett").model.system()
+    code = inline(lower(system))
+    left_out, *_ = redundant_equations(system, code.program, code.pattern())
+    plan = plan_solve(replace(code, program=replace(code.program, redundant=left_out)))
+    assert plan is not None
+    assert plan.has_choices
+    compared = [x[2:] for x in plan.nodes if x[0] == "compare"]
+    assert compared
+    assert all(number_of(plan.nodes, node) is None for pair in compared for node in pair)
