@@ -26,10 +26,11 @@ PAGES_READY := $(VENV)/pages.stamp
 LINT_READY := $(VENV)/lint.stamp
 DOCS_READY := $(VENV)/docs.stamp
 BENCH_READY := $(VENV)/bench.stamp
+RELEASE_READY := $(VENV)/release.stamp
 
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help ready demo test test-all test-slow test-elsewhere lint format types budget goldens update-goldens docs pictures course bench clean
+.PHONY: help ready demo test test-all test-slow test-elsewhere lint format types budget goldens update-goldens docs pictures course bench matrix clean
 
 help:
 	@echo "make demo            compile the wrecker boom, run it, show it on a page"
@@ -42,6 +43,7 @@ help:
 	@echo "make update-goldens  rewrite generated/"
 	@echo "make docs            the site: open site/index.html     make course   lessons to take along"
 	@echo "make pictures        the pictures, the notebooks and docs/joints.md"
+	@echo "make matrix          what is released, on each Python that is here, with the oldest and newest dependencies"
 	@echo "make clean           remove what make has made"
 
 # All that CI needs: what comes after it may run side by side.
@@ -178,6 +180,16 @@ $(BENCH_READY): $(DEMO_READY)
 bench: $(BENCH_READY)
 	@$(BIN)/python -m benchmarks
 	@for part in points analysis space stepper in_jax outputs sensitivities forces forward scale variants sweep synthesis page; do $(BIN)/python -m benchmarks.$$part || exit 1; done
+
+$(RELEASE_READY): $(DEMO_READY)
+	@echo "Installing what builds and installs a release into $(VENV)"
+	@$(PIP) --editable '.[release]'
+	@touch $@
+
+# MATRIX_TESTS="tests/unit/model -x" is a part of the tests.
+matrix: export OPENBLAS_NUM_THREADS := 1
+matrix: $(RELEASE_READY)
+	@$(BIN)/python .ci/matrix.py
 
 clean:
 	@rm -rf $(VENV) demo site course docs/made build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache

@@ -92,7 +92,13 @@ def output_option(text: str, *, required: bool = True) -> Callable[[Command], Co
 
 def deg_option(text: str) -> Callable[[Command], Command]:
     """Return the option ``--deg``, which shows angles in degrees."""
-    return click.option("--deg", "angle_unit", flag_value="deg", default="rad", help=text)
+    # Releases of click differ on what a default of a flag with a value means, so that it has no default.
+    return click.option("--deg", "angle_unit", flag_value="deg", callback=_unit, help=text)
+
+
+def _unit(context: click.Context, parameter: click.Parameter, value: str | None) -> str:
+    del context, parameter
+    return value or "rad"
 
 
 def set_option(what: str) -> Callable[[Command], Command]:

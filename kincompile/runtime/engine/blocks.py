@@ -206,7 +206,8 @@ def _determinant(factors: Any) -> float:
     pivots = factors.U.diagonal()
     size, negative = pivots.size, np.count_nonzero(pivots < 0)
     for order in (factors.perm_r, factors.perm_c):  # a circle of k numbers is k - 1 exchanges
-        circles = csr_array((np.ones(size), (np.arange(size), order)), shape=(size, size))
+        places = (np.arange(size, dtype=np.int32), order.astype(np.int32))  # as csgraph wants them
+        circles = csr_array((np.ones(size), places), shape=(size, size))
         negative += size - connected_components(circles, connection="weak")[0]
     power = np.clip(np.sum(np.log(np.abs(pivots))), -LARGEST_POWER, LARGEST_POWER)
     return float((-1.0 if negative % 2 else 1.0) * np.exp(power))
