@@ -1,9 +1,9 @@
 """`make matrix`: what is released, in clean environments, with the oldest and newest it allows.
 
-The sdist and the wheel are built, and twine looks at them. For every Python that is here the wheel is
-installed twice: with the oldest versions that pyproject.toml allows and that have wheels, and with
-the newest. In each the quick tests of the sdist run on the installed files. A Python that is missing
-is named, and its versions are looked for; only what fails is a failure. MATRIX_TESTS gives
+The sdist and the wheel are built, and twine looks at them. For every Python that is here the wheel
+is installed twice: with the oldest versions that pyproject.toml allows and that have wheels, and
+with the newest. In each the quick tests of the sdist run on the installed files. A Python that is
+missing is named, and its versions are looked for; only what fails is a failure. MATRIX_TESTS gives
 arguments of pytest, for a part of the tests.
 """
 
@@ -59,20 +59,20 @@ def run(*command: str | Path, cwd: Path | None = None) -> None:
 
 
 def interpreter(version: str) -> str | None:
-    """Return a Python of a version that is on the PATH, or that uv or pyenv has, without fetching one."""
+    """Return a Python of a version that is on the PATH, or that uv or pyenv has; fetch none."""
     asked = [UV, "python", "find", "--system", "--no-python-downloads", version]
     found = subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip()
     pyenv = Path(os.environ.get("PYENV_ROOT", "~/.pyenv")).expanduser()
     kept = sorted(map(str, pyenv.glob(f"versions/{version}.*/bin/python{version}")))
-    for python in (f"python{version}", found, *kept):
-        # Being on the PATH is not enough: version managers put shims there for what is not installed.
-        if (
-            python
-            and shutil.which(python)
-            and not subprocess.call([python, "-c", ""], stderr=subprocess.DEVNULL)
-        ):
-            return python
-    return None
+    # Being on the PATH is not enough: version managers put shims there for any version.
+    return next((one for one in (f"python{version}", str(found), *kept) if runs(one)), None)
+
+
+def runs(python: str) -> bool:
+    """Say whether a name or path is a Python that starts."""
+    if not python or shutil.which(python) is None:
+        return False
+    return subprocess.call([python, "-c", ""], stderr=subprocess.DEVNULL) == 0
 
 
 def resolve(version: str, name: str, resolution: str) -> Path | None:
@@ -80,9 +80,10 @@ def resolve(version: str, name: str, resolution: str) -> Path | None:
     wanted = FOLDER / f"{version}-{name}.txt"
     extras = [word for extra in EXTRAS for word in ("--extra", extra)]
     options = ["--quiet", "--no-header", "--no-annotate", "--only-binary", ":all:"]
+    wheels = ["--python-version", version, "--resolution", resolution]
     found = subprocess.run(
-        [UV, "pip", "compile", *options, "--python-version", version, "--resolution", resolution]
-        + [*extras, ROOT / "pyproject.toml", "--output-file", wanted],
+        [UV, "pip", "compile", *options, *wheels, *extras, "pyproject.toml", "-o", str(wanted)],
+        cwd=ROOT,
         check=False,
     )
     return wanted if found.returncode == 0 else None

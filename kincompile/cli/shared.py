@@ -92,7 +92,7 @@ def output_option(text: str, *, required: bool = True) -> Callable[[Command], Co
 
 def deg_option(text: str) -> Callable[[Command], Command]:
     """Return the option ``--deg``, which shows angles in degrees."""
-    # Releases of click differ on what a default of a flag with a value means, so that it has no default.
+    # Releases of click differ on what a default of a flag with a value means: it has no default.
     return click.option("--deg", "angle_unit", flag_value="deg", callback=_unit, help=text)
 
 
