@@ -60,7 +60,7 @@ def run(*command: str | Path, cwd: Path | None = None) -> None:
 
 def interpreter(version: str) -> str | None:
     """Return a Python of a version that is on the PATH, or that uv or pyenv has; fetch none."""
-    asked = [UV, "python", "find", "--system", "--no-python-downloads", version]
+    asked = [str(UV), "python", "find", "--system", "--no-python-downloads", version]
     found = subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip()
     pyenv = Path(os.environ.get("PYENV_ROOT", "~/.pyenv")).expanduser()
     kept = sorted(map(str, pyenv.glob(f"versions/{version}.*/bin/python{version}")))
