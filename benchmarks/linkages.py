@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Vector = NDArray[np.float64]
-    Point = tuple[Any, Any]
+    Point = Sequence[Any]
 
 GROUND = -1
 POINTS = 10_000

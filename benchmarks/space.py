@@ -45,7 +45,8 @@ class SpatialLinkage(Linkage):
     """A mechanism in space; its bodies' frames are parallel to the ground's at the start.
 
     Kinds of constraints: "revolute" (value is the axis), "universal" (the axes of i and j),
-    "spherical", "distance", and "turn" (axis, cross and C(library, t, p)).
+    "spherical", "distance", "slide" (axis, cross of i, cross of j), "plane" (the normal on i),
+    "reach" (axis of i, C(library, t, p)) and "turn" (axis, cross and C(library, t, p)).
     """
 
     def mechanism(self) -> kc.Mechanism:
@@ -55,8 +56,8 @@ class SpatialLinkage(Linkage):
         guesses = np.reshape(self.guess, (-1, 7))
         bodies = [m.body(name, g[:3]) for name, g in zip(self.bodies, guesses, strict=True)]
         for number, c in enumerate(self.constraints(p)):
-            name, i = f"{c.kind}_{number}", bodies[c.i]
-            j = m.ground if c.j == GROUND else bodies[c.j]
+            name = f"{c.kind}_{number}"
+            i, j = (m.ground if k == GROUND else bodies[k] for k in (c.i, c.j))
             if c.kind == "revolute":
                 m.add(spatial.Revolute(name, j, c.s_j, c.value, i, c.s_i, c.value))
             elif c.kind == "universal":
@@ -65,6 +66,15 @@ class SpatialLinkage(Linkage):
                 m.add(spatial.Spherical(name, i, c.s_i, j, c.s_j))
             elif c.kind == "distance":
                 m.add(spatial.Distance(name, i, c.s_i, j, c.s_j, c.value))
+            elif c.kind == "slide":
+                h, f_i, f_j = c.value
+                m.add(spatial.Translational(name, i, c.s_i, h, f_i, j, c.s_j, h, f_j))
+            elif c.kind == "plane":
+                m.add(spatial.InPlane(name, i, c.s_i, c.value, j, c.s_j))
+            elif c.kind == "reach":
+                h, reach = c.value
+                value = reach(sympy, kc.t, p)
+                m.add(spatial.RelativeTranslation(name, i, c.s_i, h, j, c.s_j, value))
             else:
                 h, f, angle = c.value
                 m.add(spatial.RelativeRotation(name, j, h, f, i, h, f, angle(sympy, kc.t, p)))
@@ -84,6 +94,17 @@ class SpatialLinkage(Linkage):
                 turned, value = _turned(q, c.i, f), angle(library, t, p)
                 sine, cosine = (_dot(_turned(q, c.j, v), turned) for v in (g, f))
                 rows.append(sine * library.cos(value) - cosine * library.sin(value))
+            elif c.kind == "plane":
+                rows.append(_dot(_turned(q, c.i, c.value), d))
+            elif c.kind == "reach":
+                h, reach = c.value
+                rows.append(-_dot(_turned(q, c.i, h), d) - reach(library, t, p))
+            elif c.kind == "slide":
+                h, f_i, f_j = c.value
+                sides = [_turned(q, c.i, side) for side in _triad(h, f_i)[:2]]
+                along = _turned(q, c.j, h)
+                rows += [_dot(side, along) for side in sides] + [_dot(side, d) for side in sides]
+                rows.append(_dot(sides[0], _turned(q, c.j, f_j)))
             else:
                 rows += d
             if c.kind == "revolute":
@@ -140,7 +161,15 @@ class _Drawing:
         return (self._points[name] - origin).tolist()  # type: ignore[no-any-return]
 
     def joint(self, kind: str, i: int, name: str, j: int = GROUND, value: Any = 0) -> Constraint:
-        return Constraint(kind, i, self.local(i, name), j, self.local(j, name), value)  # type: ignore[arg-type]
+        return self.between(kind, i, name, j, name, value)
+
+    def between(
+        self, kind: str, i: int, name_i: str, j: int, name_j: str, value: Any
+    ) -> Constraint:
+        return Constraint(kind, i, self.local(i, name_i), j, self.local(j, name_j), value)
+
+    def far(self, start: str, end: str) -> float:
+        return float(np.linalg.norm(self._points[end] - self._points[start]))
 
     def axis(self, start: str, end: str) -> list[float]:
         along = self._points[end] - self._points[start]
@@ -201,10 +230,7 @@ def _double_wishbone() -> SpatialLinkage:
         ("lower_front", "upper_front", "lower_ball"),
     )
     lower, upper = (drawing.axis(f"{name}_front", f"{name}_rear") for name in ("lower", "upper"))
-    tie = drawing.joint("distance", 2, "tie_ball").s_i
-    length = float(
-        np.linalg.norm(drawing.local(GROUND, "tie_ball") - np.array(drawing.local(GROUND, "rack")))
-    )
+    length = drawing.far("tie_ball", "rack")
 
     def constraints(p: Sequence[Any]) -> list[Constraint]:
         del p
@@ -218,7 +244,7 @@ def _double_wishbone() -> SpatialLinkage:
             drawing.joint("revolute", 1, "upper_front", value=upper),
             drawing.joint("spherical", 0, "lower_ball", 2),
             drawing.joint("spherical", 1, "upper_ball", 2),
-            Constraint("distance", 2, tie, GROUND, drawing.local(GROUND, "rack"), length),  # type: ignore[arg-type]
+            drawing.between("distance", 2, "tie_ball", GROUND, "rack", length),
             drawing.joint("turn", 0, "lower_front", value=swing),
         ]
 
@@ -226,12 +252,134 @@ def _double_wishbone() -> SpatialLinkage:
     return SpatialLinkage("double_wishbone", {"omega": 1.5}, bodies, drawing.guess(), constraints)
 
 
-LINKAGES = (_rssr(), _double_wishbone())
+def _around(count: int, radius: float, height: float, shift: float = 0.0) -> list[Any]:
+    """Return places around the z axis; every second one goes so far ahead, the others back."""
+    angles = 2 * np.pi * np.arange(count) / count + shift * (-1.0) ** np.arange(count)
+    return [np.array([radius * np.cos(a), radius * np.sin(a), height]) for a in angles]
+
+
+def _delta() -> SpatialLinkage:
+    """Return a Delta robot: three arms that swing, and pairs of rods to a platform."""
+    points: dict[str, Any] = {"platform": (0, 0, -0.5)}
+    for k, out in enumerate(_around(3, 1.0, 0.0)):
+        across = np.array([-out[1], out[0], 0.0])
+        points |= {f"hinge_{k}": 0.2 * out, f"pin_{k}": 0.2 * out + across, f"out_{k}": 1.2 * out}
+        for side, shift in (("a", 0.04), ("b", -0.04)):
+            points[f"elbow_{k}{side}"] = 0.4 * out + shift * across + (0, 0, -0.15)
+            points[f"ball_{k}{side}"] = 0.05 * out + shift * across + (0, 0, -0.5)
+    drawing = _Drawing(points, ("platform", "hinge_0", "hinge_1", "hinge_2"))
+    rods = []
+    for k in range(3):
+        for side in "ab":
+            elbow, ball = (f"{name}_{k}{side}" for name in ("elbow", "ball"))
+            ends = drawing.local(k + 1, elbow), drawing.local(0, ball)
+            rods.append(
+                Constraint("distance", k + 1, ends[0], 0, ends[1], drawing.far(elbow, ball))
+            )
+
+    def constraints(p: Sequence[Any]) -> list[Constraint]:
+        del p
+        found = list(rods)
+        for k in range(3):
+            pin, out = (
+                drawing.axis(f"hinge_{k}", f"pin_{k}"),
+                drawing.axis("platform", f"hinge_{k}"),
+            )
+            out = (np.array(out) - np.dot(out, pin) * np.array(pin)).tolist()
+            swing = pin, out, lambda library, t, p, k=k: (0.2 + 0.05 * k) * library.sin(p[0] * t)
+            found.append(drawing.joint("revolute", k + 1, f"hinge_{k}", value=pin))
+            found.append(drawing.joint("turn", k + 1, f"hinge_{k}", value=swing))
+        return found
+
+    bodies = ("platform", "arm_1", "arm_2", "arm_3")
+    return SpatialLinkage("delta", {"omega": 1.5}, bodies, drawing.guess(), constraints)
+
+
+def _platform() -> SpatialLinkage:
+    """Return a Stewart-Gough platform of thirteen bodies: six legs, a cylinder and a rod each."""
+    feet, balls = _around(6, 0.6, 0.0, 0.3), _around(6, 0.35, 0.7, -0.2)
+    points = {"platform": (0.0, 0.0, 0.7)}
+    points |= {f"foot_{k}": tuple(x) for k, x in enumerate(feet)}
+    points |= {f"ball_{k}": tuple(x) for k, x in enumerate(balls)}
+    legs = [(f"foot_{k}", f"ball_{k}") for k in range(6)]
+    drawing = _Drawing(points, ("platform", *(end for leg in legs for end in leg)))
+
+    def constraints(p: Sequence[Any]) -> list[Constraint]:
+        del p
+        found = []
+        for k, (foot, ball) in enumerate(legs):
+            cylinder, rod, along = 2 * k + 1, 2 * k + 2, drawing.axis(foot, ball)
+            side = np.cross(along, TURNED[:, 2])
+            side /= np.linalg.norm(side)
+            across = np.cross(along, side).tolist()
+            length = drawing.far(foot, ball)
+
+            def reach(library: Any, t: Any, p: Any, length: float = length, k: int = k) -> Any:
+                return length + (0.03 + 0.01 * (k % 3)) * library.sin(p[0] * t)
+
+            slide = along, side.tolist(), across
+            found += [
+                drawing.joint("universal", cylinder, foot, value=(across, side.tolist())),
+                drawing.between("slide", cylinder, foot, rod, ball, slide),
+                drawing.joint("spherical", rod, ball, 0),
+                drawing.between("reach", cylinder, foot, rod, ball, (along, reach)),
+            ]
+        return found
+
+    bodies = ("platform", *(f"{name}_{k}" for k in range(6) for name in ("cylinder", "rod")))
+    return SpatialLinkage("platform", {"omega": 1.5}, bodies, drawing.guess(), constraints)
+
+
+def _pump() -> SpatialLinkage:
+    """Return a pump of fourteen bodies: pistons that slide in a rotor, on an inclined plate."""
+    tilt = np.radians(15)
+    normal = np.array([np.sin(tilt), 0.0, np.cos(tilt)])
+    heads = [x - (0, 0, x @ normal / normal[2]) for x in _around(13, 0.05, 0.0)]
+    points: dict[str, Any] = {"rotor": (0, 0, 0), "up": (0, 0, 1), "side": (1, 0, 0)}
+    points |= {"across": (0, 1, 0), "normal": normal}
+    points |= {f"head_{k}": tuple(x) for k, x in enumerate(heads)}
+    names = tuple(f"head_{k}" for k in range(13))
+    drawing = _Drawing(points, ("rotor", *names))
+    up, side, across, plate = (
+        drawing.axis("rotor", name) for name in ("up", "side", "across", "normal")
+    )
+
+    def constraints(p: Sequence[Any]) -> list[Constraint]:
+        del p
+        turn = up, side, lambda _, t, p: p[0] * t
+        found = [
+            drawing.joint("revolute", 0, "rotor", value=up),
+            drawing.joint("turn", 0, "rotor", value=turn),
+        ]
+        for k, name in enumerate(names):
+            found.append(drawing.joint("slide", 0, name, k + 1, (up, side, across)))
+            place = drawing.local(k + 1, name)
+            found.append(
+                Constraint("plane", GROUND, drawing.local(GROUND, "rotor"), k + 1, place, plate)
+            )
+        return found
+
+    bodies = ("rotor", *(f"piston_{k}" for k in range(13)))
+    return SpatialLinkage("pump", {"omega": 1.5}, bodies, drawing.guess(), constraints)
+
+
+LINKAGES = (_rssr(), _double_wishbone(), _delta(), _platform(), _pump())
+
+
+LIMITS = {
+    "rssr": (analysis.PLAIN, 0.8, 0.2),
+    "double_wishbone": (analysis.PLAIN, 0.8, 0.2),
+    "platform": (analysis.GENERATED, 0.9, 0.3),
+    "pump": (analysis.GENERATED, 0.9, 0.3),
+}
+"""The contender beside which NumPy and C may take at most such parts of its time."""
+A_COORDINATE = ("delta", "double_wishbone", 1.5)
+"""Emitted C for the one may take so many times as long a coordinate as for the other."""
 
 
 def main(points: int) -> None:
     """Measure and print."""
-    before, targets = machine.load(), []
+    before, targets, a_coordinate = machine.load(), list[Target](), dict[str, float]()
     for linkage in LINKAGES:
         analyses, skipped = analysis.build(linkage, points, BUILDERS)
         times = analysis.measure(analyses, linkage.times(points))
@@ -241,15 +389,23 @@ def main(points: int) -> None:
             analysis.rows(times, skipped),
         )
         targets += list(reached(linkage, times))
+        a_coordinate[linkage.name] = times[analysis.C].median / len(linkage.guess)
+    one, other, limit = A_COORDINATE
+    ratio = a_coordinate[one] / a_coordinate[other]
+    targets.append(Target(f"C a coordinate: {one} / {other}", ratio, "at most", limit))
     print_targets("Whole analyses in space: what was to be reached, ratios of medians", targets)
     print(f"{machine.description()}. Load before {before}, after {machine.load()}.")
 
 
 def reached(linkage: Linkage, times: dict[str, Timing]) -> Iterator[Target]:
     """Compare with what was to be reached."""
-    for name, limit in ((analysis.NUMPY, 0.8), (analysis.C, 0.2)):
-        ratio = times[name].median / times[analysis.PLAIN].median
-        yield Target(f"{linkage.name}: {name} / {analysis.PLAIN}", ratio, "at most", limit)
+    peer, *limits = LIMITS.get(linkage.name, (analysis.PLAIN,))
+    for name, limit in zip((analysis.NUMPY, analysis.C), limits, strict=False):
+        if peer in times:
+            ratio = times[name].median / times[peer].median
+            yield Target(f"{linkage.name}: {name} / {peer}", ratio, "at most", limit)
+    if linkage.name not in ("rssr", "double_wishbone"):
+        return
     mechanism = linkage.mechanism()
     built = in_turn({"build": lambda: kc.compile(mechanism)}, calls=1, rounds=BUILDING_ROUNDS)
     ms = built["build"].median * 1e3

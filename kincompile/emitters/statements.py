@@ -75,7 +75,7 @@ class Statements:
             "k": len(program.parameters),
             "functions": text,
             "has_square": "square(" in text,
-            "has_blocks": listing is not None and listing.plan.has_large_blocks,
+            "has_blocks": listing is not None and listing.plan.largest_call > 0,
             "n_factors": 0 if listing is None else len(listing.factors),
             "n_blocks": 0 if listing is None else len(listing.plan.determinants),
         }

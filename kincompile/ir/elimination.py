@@ -3,8 +3,8 @@
 Most pivots of Phi_q are plain numbers, +1 or -1 from joints and drivers. Elimination with those is
 safe for every q, t and p, costs few operations, and leaves a small system that falls into blocks:
 a four-bar of nine equations leaves one of two. Blocks of up to three are solved in closed form,
-larger ones by LAPACK. The code is a graph like any other: what depends on Phi_q alone is the
-factorization, shared by all right sides.
+larger ones by LAPACK, or a part at a time where they fall into parts (`bordered`). The code is a
+graph like any other: what depends on Phi_q alone is the factorization, shared by all right sides.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kincompile.criteria import NOISE, SAFE_PIVOT, SLIGHT, probe_of, rounded, size_of
+from kincompile.ir.bordered import LARGEST_PART, bordered, eliminated, solve_parts
 from kincompile.ir.graph import Constant, Graph, Node
 from kincompile.ir.inline import input_name
 from kincompile.ir.interpret import apply, evaluator
@@ -40,9 +41,9 @@ Matrix = dict[int, dict[int, int]]
 
 LARGEST_CLOSED_FORM = 3
 """Blocks up to this size are solved by their adjugate, as Cramer's rule does."""
-LARGEST_PIVOTED = 6
+LARGEST_PIVOTED = LARGEST_PART
 """Blocks up to this size are eliminated in straight-line code in space, where six unknowns a body
-are the rule; larger ones by LAPACK."""
+are the rule; larger ones in parts, or by LAPACK."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,14 +145,13 @@ class SolvePlan:
 
     @property
     def has_choices(self) -> bool:
-        """Whether rows change places: there is a block of more than three, not solved by LAPACK."""
-        sizes = (len(block.rows) for block in self.blocks)
-        return any(LARGEST_CLOSED_FORM < size <= self.straight for size in sizes)
+        """Whether rows change places, which LAPACK does by itself."""
+        return any(node[0] == "select" for node in self.nodes)
 
     @property
-    def has_large_blocks(self) -> bool:
-        """Whether there is a block that LAPACK solves."""
-        return any(len(block.rows) > self.straight for block in self.blocks)
+    def largest_call(self) -> int:
+        """How many equations LAPACK solves together at most."""
+        return max((int(node[2]) for node in self.nodes if node[0] == "linear"), default=0)
 
 
 def plan_solve(
@@ -260,7 +260,7 @@ def plan_entries(
             determinants += pivots_there
             looks.append(look)
         else:
-            determinants += _solve_block(graph, block, matrix, right, solution, straight)
+            determinants += _solve_block(graph, block, matrix, right, solution, straight, sizes)
         for item in rotations:
             if not item.is_finished and solution.keys() >= set(item.turns):
                 item.finish(matrix, solution)
@@ -422,60 +422,48 @@ def _solve_block(
     right: dict[int, int],
     solution: dict[int, int],
     straight: int,
+    sizes: Sizes,
 ) -> list[int]:
     """Add the solution of a block to what is known; return the node of its determinant."""
+    sides = {
+        row: _remainder(graph, matrix[row], block.columns, right[row], solution)
+        for row in block.rows
+    }
+    solve = partial(_solved, graph, straight)
+    if len(block.rows) > LARGEST_PIVOTED:
+        known = replace(sizes, entries=dict(sizes.entries), values=dict(sizes.values))
+        known.measure(graph, {row: matrix[row] for row in block.rows})
+        own = {row: {k: matrix[row][k] for k in matrix[row] if k in block.columns} for row in sides}
+        form = bordered(block, own, lambda row, column: known.values[row, column])
+        if form is not None:
+            found, determinant = solve_parts(graph, block, form, own, sides, solve)
+            solution |= found
+            return [determinant]
     zero = graph.const(0)
-    size = len(block.rows)
     a = [[matrix[row].get(column, zero) for column in block.columns] for row in block.rows]
-    b = [_remainder(graph, matrix[row], block.columns, right[row], solution) for row in block.rows]
-    if LARGEST_CLOSED_FORM < size <= straight:
-        x, pivots = _pivoted(graph, a, b)
-        solution |= zip(block.columns, x, strict=True)
-        return [pivots]
-    if size > straight:
-        entries = [node for row in a for node in row]
-        for k, column in enumerate(block.columns):
-            solution[column] = graph.linear("solve", size, k, (*entries, *b))
-        return [graph.linear("determinant", size, 0, entries)]
-    adjugate, determinant = _adjugate(graph, a)
-    inverse = graph.div(graph.const(1), determinant)
-    for column, cofactors in zip(block.columns, adjugate, strict=True):
-        total = graph.mul(cofactors[0], b[0])
-        for cofactor, value in zip(cofactors[1:], b[1:], strict=True):
-            total = graph.add(total, graph.mul(cofactor, value))
-        solution[column] = graph.mul(total, inverse)
+    x, determinant = solve(a, list(sides.values()))
+    solution |= zip(block.columns, x, strict=True)
     return [determinant]
 
 
-def _pivoted(graph: Graph, a: list[list[int]], b: list[int]) -> tuple[list[int], int]:
-    """Return x of a x = b by elimination with partial pivoting, and the determinant of a.
-
-    Rows change places by choices, not by branches, so that many points are solved at once.
-    """
-    size, determinant = len(a), graph.const(1)
-    inverses = []
-    for k in range(size):
-        for i in range(k + 1, size):
-            if graph.value_of(a[i][k]) == 0:
-                continue  # never larger
-            is_larger = graph.compare("<", graph.square(a[k][k]), graph.square(a[i][k]))
-            choose = partial(graph.select, is_larger)
-            pairs = [(choose(y, x), choose(x, y)) for x, y in zip(a[k][k:], a[i][k:], strict=True)]
-            a[k][k:], a[i][k:] = (list(row) for row in zip(*pairs, strict=True))
-            b[k], b[i] = choose(b[i], b[k]), choose(b[k], b[i])
-            determinant = choose(graph.neg(determinant), determinant)
-        determinant = graph.mul(determinant, a[k][k])
-        inverses.append(graph.div(graph.const(1), a[k][k]))
-        for i in range(k + 1, size):
-            factor = graph.mul(a[i][k], inverses[k])
-            for j in range(k + 1, size):
-                a[i][j] = graph.sub(a[i][j], graph.mul(factor, a[k][j]))
-            b[i] = graph.sub(b[i], graph.mul(factor, b[k]))
-    x = list(b)
-    for k in reversed(range(size)):
-        for j in range(k + 1, size):
-            x[k] = graph.sub(x[k], graph.mul(a[k][j], x[j]))
-        x[k] = graph.mul(x[k], inverses[k])
+def _solved(graph: Graph, straight: int, a: list[list[int]], b: list[int]) -> tuple[list[int], int]:
+    """Return x of a x = b, and the determinant of a, by a call above `straight` equations."""
+    size = len(a)
+    if size > straight:
+        entries = [node for row in a for node in row]
+        x = [graph.linear("solve", size, k, (*entries, *b)) for k in range(size)]
+        return x, graph.linear("determinant", size, 0, entries)
+    if size > LARGEST_CLOSED_FORM:
+        done = eliminated(graph, a, b, size)
+        return done.solved(graph, ()), done.determinant
+    adjugate, determinant = _adjugate(graph, a)
+    inverse = graph.div(graph.const(1), determinant)
+    x = []
+    for cofactors in adjugate:
+        total = graph.mul(cofactors[0], b[0])
+        for cofactor, value in zip(cofactors[1:], b[1:], strict=True):
+            total = graph.add(total, graph.mul(cofactor, value))
+        x.append(graph.mul(total, inverse))
     return x, determinant
 
 

@@ -11,7 +11,7 @@ from kincompile import criteria, quantities
 from kincompile.emitters.c.float32 import NAMES, in_float32
 from kincompile.emitters.c.functions import ABOUT, WRITE, C, block_call
 from kincompile.emitters.c.march import CSolver
-from kincompile.emitters.c.target import RESERVED, array, elementary, largest_block, places
+from kincompile.emitters.c.target import RESERVED, array, elementary, places
 from kincompile.emitters.constants import items
 from kincompile.emitters.lines import braced, indented
 from kincompile.emitters.planned_solve import schedule_solve
@@ -185,7 +185,7 @@ class Target:
             "numbers": indented(numbers(self.start.real, NUMBERS), 0),
             "tables": "\n".join(_tables(code)),
             "fingerprint": program.fingerprint,
-            "elementary": elementary(program, called, largest_block(listing), is_fast=False),
+            "elementary": elementary(program, called, listing.plan.largest_call, is_fast=False),
             "functions": indented(lines, 0),
             "solver": solver.text(),
             "p": array(

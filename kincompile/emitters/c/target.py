@@ -243,7 +243,7 @@ def _strip(
     largest = 0
     if listing is not None:
         lines = [*lines, *solve_functions(code, listing)]
-        largest = largest_block(listing)
+        largest = listing.plan.largest_call
     data = {
         "is_planned": listing is not None,
         "n_angles": len(places_of_angles(code)),
@@ -255,12 +255,6 @@ def _strip(
         ),
     }
     return fill("c/strip.c.jinja", data)
-
-
-def largest_block(listing: SolveListing) -> int:
-    """Return the size of the largest block that a call solves, 0 where none does."""
-    sizes = (len(block.rows) for block in listing.plan.blocks)
-    return max((size for size in sizes if size > listing.plan.straight), default=0)
 
 
 def elementary(

@@ -85,7 +85,7 @@ def files(
     text = "\n".join(lines)
     if plan is not None and plan.has_choices:
         called = {*called, "where"}
-    large = {"has_large_blocks": plan is not None and plan.has_large_blocks}
+    large = {"has_large_blocks": plan is not None and plan.largest_call > 0}
     data = {
         **_constants(code),
         "kernels": text,

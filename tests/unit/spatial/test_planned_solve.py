@@ -45,10 +45,11 @@ def hinge(slope: float | None = None) -> spatial.Mechanism:
 
 
 MECHANISMS = [*(linkage.mechanism for linkage in LINKAGES), six_struts, hinge]
+NAMES = [*(linkage.name for linkage in LINKAGES), "six_struts", "hinge"]
 
 
 @pytest.mark.parametrize("target", ["numpy", pytest.param("c", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("make", MECHANISMS, ids=["rssr", "wishbone", "six_struts", "hinge"])
+@pytest.mark.parametrize("make", MECHANISMS, ids=NAMES)
 def test_that_x_is_that_of_lapack(make, target: str) -> None:
     module = kc.compile(make(), target=target)
     n = len(module.COORDINATES)
@@ -82,7 +83,7 @@ def before_dead_centre(module, seed: int, away: float) -> tuple[np.ndarray, np.n
 
 
 @pytest.mark.parametrize("away", [1e-2, 1e-5, 1e-8])
-@pytest.mark.parametrize("make", MECHANISMS[:2], ids=["rssr", "wishbone"])
+@pytest.mark.parametrize("make", MECHANISMS[:2], ids=NAMES[:2])
 def test_that_before_a_dead_centre_x_is_as_right_as_lapacks(make, away: float) -> None:
     """A plan without pivots loses nothing there: what is lost any method loses."""
     module, errors = kc.compile(make()), []
@@ -115,7 +116,7 @@ def test_that_an_axis_that_parameters_turn_is_no_fixed_direction() -> None:
     assert "# block: pi_f_bar, pi_g_bar, pi_h_bar by A.f, A.g, motor\n" in emit(hinge()).source
 
 
-@pytest.mark.parametrize("make", MECHANISMS, ids=["rssr", "wishbone", "six_struts", "hinge"])
+@pytest.mark.parametrize("make", MECHANISMS, ids=NAMES)
 def test_that_verify_finds_it_right_with_its_determinants(make) -> None:
     verification = kc.verify(kc.compile(make()))
     assert verification.passed, str(verification)
