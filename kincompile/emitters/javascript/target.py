@@ -140,6 +140,11 @@ def _solver(program: Program) -> str:
     tables = []
     for name, values in solver_tables(program).items():
         tables += [f"const {name} = [", *indented(wrapped(items(values))).split("\n"), "];"]
+    return solver_text(tables)
+
+
+def solver_text(tables: list[str]) -> str:
+    """Return the solver with lines that declare its tables, or with tables that are there."""
     slots = _parts() | {"tables": indented(tables)}
     return indented(fill("javascript/solver.js.jinja", slots).rstrip().split("\n"))
 
