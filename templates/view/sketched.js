@@ -262,6 +262,13 @@ function apexOf([from, to], [near, far], [drawnFrom, drawnTo, drawn], joint) {
   return [from[0] + (along * x - height * y) / base, from[1] + (along * y + height * x) / base];
 }
 
+/** Whether the value of a constraint changes with time.
+ * @param {any} constraint */
+export function isDriver({ functions }, symbol = 'C') {
+  const jet = functions[symbol];
+  return jet !== undefined && [0, 0.1237, 0.371].some(t => jet(t)[1] !== 0 || jet(t)[2] !== 0);
+}
+
 /* ---- a whole file ---- */
 
 const listOf = given => {
