@@ -5,3 +5,5 @@ declare const forces: any;
 declare const transmitted: any;
 declare const geometry: any;
 declare const worlds: any;
+/* By kincompile/emitters/javascript/kernels.py, of the editor. */
+declare const kernels: any;

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import click
 
-import kincompile as kc
 from kincompile.cli.shared import output_option, read_model, require_output
+from kincompile.errors import InputError
+from kincompile.view.editor import editor_page
+from kincompile.writing import write_atomically
 
 
 @click.command("editor")
@@ -21,9 +23,10 @@ def command(model: str | None, output: str) -> None:
     """
     if model is not None:
         require_output(output, model, "the model itself")
-    page = kc.editor(None if model is None else _text_of(model))
-    page.write(output)
-    click.echo(f"Wrote {output}", err=True)
+    if Path(output).suffix not in (".html", ".htm"):
+        raise InputError(f"cannot write {output}: end its name in .html")
+    page = editor_page("" if model is None else _text_of(model))
+    click.echo(f"Wrote {write_atomically(output, page)}", err=True)
 
 
 def _text_of(model: str) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import re
 
 from kincompile.emitters.javascript.kernels import kernels_script
 from kincompile.report.templates import fill, read
 from kincompile.runtime.singular.events import SENTENCES
+from kincompile.view.modules import joined
 from kincompile.view.shapes import tables
 
 MODULES = (
@@ -35,9 +35,3 @@ def editor_page(text: str = "") -> str:
         "scripts": [kernels_script(), joined(MODULES)],
     }
     return fill("view/editor.html.jinja", slots)
-
-
-def joined(names: tuple[str, ...]) -> str:
-    """Return modules as one script, without their imports and exports."""
-    texts = [read(f"view/{name}") for name in names]
-    return "\n".join(re.sub(r"^import .*;\n|^export (?=\w)|^'use strict';\n", "", x, flags=re.M) for x in texts)

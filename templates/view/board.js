@@ -16,7 +16,16 @@ const TURN_STEP = Math.PI / 12;  // of a direction that is snapped
 export class Board {
   /** @param {HTMLCanvasElement} canvas @param {any} editing @param {any} tables shapes, looks, hues */
   constructor(canvas, editing, tables) {
-    Object.assign(this, { canvas, editing, tables, index: 0, first: null, held: null, cursor: null, fingers: new Map() });
+    this.canvas = canvas;
+    this.editing = editing;
+    this.tables = tables;
+    this.index = 0;  // of the time that is shown
+    this.first = null;  // the end from which a tool goes on: { joint, place }
+    this.held = this.hovered = null;  // names of joints
+    /** @type {number[] | null} */
+    this.cursor = null;  // where the pointer is, or the cross that stands for it
+    this.fingers = new Map();
+    this.width = this.height = 1;
     this.ctx = canvas.getContext('2d');
     this.extent = [-1, 1, -0.7, 0.7];
     this.camera = null;
@@ -28,7 +37,8 @@ export class Board {
 
   resize() {
     const { width, height } = this.canvas.parentElement.getBoundingClientRect(), dense = devicePixelRatio || 1;
-    Object.assign(this, { width, height });
+    this.width = width;
+    this.height = height;
     Object.assign(this.canvas, { width: Math.round(width * dense), height: Math.round(height * dense) });
     this.ctx.setTransform(dense, 0, 0, dense, 0, 0);
     this.palette = paletteNow({ hues: this.tables.hues });
@@ -59,7 +69,9 @@ export class Board {
   /* Look at all of it. */
   fit() {
     const places = [...this.jointPlaces().values()], pad = 0.25;
-    let [left, right, low, high] = this.drawing ? boxOf(this.drawing.marks, this.states().map(state => state.q)) : [Infinity, -Infinity, Infinity, -Infinity];
+    /** @type {any} */
+    const box = this.drawing ? boxOf(this.drawing.marks, this.states().map(state => state.q)) : [Infinity, -Infinity, Infinity, -Infinity];
+    let [left, right, low, high] = box;
     for (const [x, y] of places) [left, right, low, high] = [Math.min(left, x), Math.max(right, x), Math.min(low, y), Math.max(high, y)];
     const size = Math.max(right - left, high - low, 0) || 2;
     if (left <= right) this.extent = [left - pad * size, right + pad * size, low - pad * size, high + pad * size];
@@ -67,7 +79,7 @@ export class Board {
   }
 
   get view() {
-    return new View(this.extent, this.width, this.height, BOARD_MARGIN, this.camera);
+    return new View(/** @type {any} */ (this.extent), this.width, this.height, BOARD_MARGIN, this.camera);
   }
 
   /* ---- where things are ---- */
@@ -92,7 +104,12 @@ export class Board {
     return found;
   }
 
+  /** The joint that is meant at a place, or where it snaps to. @param {number[]} place */
   jointAt(place, reach = NEAR_JOINT) {
+    return this.nearestJoint(place, reach) ?? this.nearestJoint(this.snapped(place), 1);
+  }
+
+  nearestJoint(place, reach) {
     let best = null, least = reach / this.view.scale;
     for (const [name, [x, y]] of this.jointPlaces()) {
       const away = Math.hypot(x - place[0], y - place[1]);
@@ -102,6 +119,7 @@ export class Board {
   }
 
   /* The moving link whose line is nearest. */
+  /** @param {any} place */
   linkAt(place, reach = NEAR_LINK) {
     const places = this.jointPlaces();
     let best = null, least = reach / this.view.scale;
@@ -194,6 +212,7 @@ export class Board {
   }
 
   drawBand(pen, view) {
+    /** @type {any} */
     const from = this.first.joint ? this.jointPlaces().get(this.first.joint) : this.first.place;
     if (!from || !this.cursor) return;
     pen.path([from, this.cursor].map(place => view.toScreen(place)));
@@ -286,6 +305,7 @@ export function connectPointers(board, act) {
 }
 
 /* Two fingers: what was between them stays there. */
+/** @param {Board} board @param {any} from @param {any} to */
 function pinch(board, [a, b], [c, d]) {
   const middle = (one, other) => [(one[0] + other[0]) / 2, (one[1] + other[1]) / 2], before = middle(a, b), after = middle(c, d);
   board.pan(after[0] - before[0], after[1] - before[1]);

@@ -4,7 +4,7 @@
    `Bound` has the constants and functions of an emitted module: position_at, nu_at, factor_at, ...  Where
    only numbers change it takes others and stays, with all that the browser has learnt to do fast. */
 
-import { Factors, pivotsOf } from './sparse.js';
+import { Factors } from './sparse.js';
 
 const LETTERS = ['x', 'y', 'phi'];
 const RANK_TOLERANCE = 1e-8;  // part of a row's own size up to which it depends on others
@@ -30,6 +30,14 @@ export class Bound {
     this.COVER = this.COORDINATES.map(() => n);
     this.PROBE = kernels.probe.slice(0, Math.max(n, m));
     this.IS_REDUNDANT = this.EQUATIONS.map(() => false);
+    this.rank = this.rankAtStart = 0;
+    this.isAssembled = false;
+    /** @type {any} */
+    this.start = null;  // the position at the first time
+    /** @type {number[]} */
+    this.free = [];  // columns that may still move
+    /** @type {number[]} */
+    this.scales = [];
     for (const name of ['point', 'position_at', 'nu_at', 'gamma_at', 'factor_at', 'solve_at', 'rows_of']) this[name] = this[name].bind(this);
     this.take(model);
     this.solver = kernels.solverOf(this);

@@ -15,6 +15,8 @@ export class Editing {
   constructor(file = newFile()) {
     this.past = [];
     this.future = [];
+    /** @type {Object<string, string>} */
+    this.sentences = {};  // of events
     this.open(file);
   }
 

@@ -448,7 +448,7 @@ function nextAssembly() {
 function start() {
   for (const [name, letter, title, about] of TOOLS) {
     const button = made('button', title);
-    Object.assign(button, { type: 'button', title: `${about} (${letter})`, ariaKeyShortcuts: letter, onclick: () => editor.take(name) });
+    Object.assign(button, { type: 'button', title: `${about} (${letter})`, onclick: () => editor.take(name) });
     button.dataset.tool = name;
     part('tools').append(button);
   }

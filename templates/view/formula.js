@@ -169,6 +169,7 @@ function powerJet(base, exponent, constant) {
   };
 }
 
+/** @param {any} one @param {any} other */
 function product([a, a1, a2, a3], [b, b1, b2, b3]) {
   return [a * b, a1 * b + a * b1, a2 * b + 2 * a1 * b1 + a * b2, a3 * b + 3 * (a2 * b1 + a1 * b2) + a * b3];
 }
@@ -179,6 +180,7 @@ function quotient(a, b) {
 }
 
 /* The chain rule: derivatives of f(u), of f by u and of u. */
+/** @param {any} outer @param {any} inner */
 function composed([f, f1, f2, f3], [, u1, u2, u3]) {
   return [f, f1 * u1, f2 * u1 * u1 + f1 * u2, f3 * u1 * u1 * u1 + 3 * f2 * u1 * u2 + f1 * u3];
 }

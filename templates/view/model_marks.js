@@ -105,7 +105,7 @@ class OnModel {
   }
 
   bearing() {
-    const frame = this.all.frames[this.constraint.frames.findLast(k => k >= 0)];
+    const frame = this.all.frames[this.constraint.frames.filter(k => k >= 0).pop()];
     return this.all.bearings.get(frame.index) ?? { frame, point: [0, 0] };
   }
 

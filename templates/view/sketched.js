@@ -13,7 +13,9 @@ export const GROUND_NAME = 'ground';
 export class ModelProblem extends Error {}
 
 const known = (table, name) => Object.hasOwn(table, name);
+/** @type {(one: any, other: any) => number[]} */
 const minus = ([a, b], [x, y]) => [a - x, b - y];
+/** @type {(vector: any) => number} */
 const lengthOf = ([x, y]) => Math.hypot(x, y);
 
 class Sketched {
@@ -121,6 +123,7 @@ class Sketched {
 }
 
 /* A vector of the drawing in a frame that is turned. */
+/** @param {any} vector */
 function turnedBack([x, y], angle) {
   const c = Math.cos(angle), s = Math.sin(angle);
   return angle ? [x * c + y * s, y * c - x * s] : [x, y];

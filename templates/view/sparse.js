@@ -62,6 +62,7 @@ export class Factors {
     this.pattern = this.entries.map(k => [place.get(pattern[k][0]), pattern[k][1]]);
     this.work = new Float64Array(this.n);
     this.determinant = 0;
+    this.steps = this.lower = this.upper = new Int32Array(0);  // what is done, as places
   }
 
   /* Choose the order for a matrix, and list what is to be done. */
