@@ -142,6 +142,7 @@ export class Board {
     return [1, 2, 5, 10].find(k => k * power >= wanted) * power;
   }
 
+  /** A place, or that of the grid nearest to it. @returns {any} */
   snapped(place) {
     return this.snaps ? place.map(x => Number((Math.round(x / this.step) * this.step).toPrecision(12))) : place;
   }
@@ -219,6 +220,7 @@ export class Board {
     pen.stroke(this.palette.drive, 2, [6, 5]);
   }
 
+  /** @param {any} pen @param {any} place */
   drawCursor(pen, [x, y]) {
     pen.path([[x - 12, y], [x - 3, y], null, [x + 3, y], [x + 12, y], null, [x, y - 12], [x, y - 3], null, [x, y + 3], [x, y + 12]]);
     pen.stroke(this.palette.drive, 2);
@@ -250,6 +252,7 @@ export class Board {
 }
 
 /* How far a place is from a line between two. */
+/** @param {any} place @param {any} from @param {any} to */
 function fromSegment([x, y], [a, b], [c, d]) {
   const [u, v] = [c - a, d - b], square = u * u + v * v;
   const part = square ? Math.min(1, Math.max(0, ((x - a) * u + (y - b) * v) / square)) : 0;

@@ -2,6 +2,7 @@
    read and written anew, so that no text of a file becomes code. */
 
 import { parsedFormula } from './formula.js';
+import { ModelProblem } from './sketched.js';
 
 const OF_SYMPY = { ln: 'log', arcsin: 'asin', arccos: 'acos', arctan: 'atan', log: 'log' };
 
@@ -27,8 +28,10 @@ export function writePython(file) {
   lines.push('m = s.mechanism()');
   for (const { name, guess = [0, 0, 0] } of file.bodies ?? []) lines.push(`m.body(${quoted(name)}, guess=${value(guess)})`);
   for (const { type, name, ...given } of file.constraints ?? []) {
-    const more = Object.entries(given).map(([key, x]) => `${word(key)}=${value(x)}`);
-    lines.push(`m.add(kc.${word(type)}(${[quoted(name), ...more].join(', ')}))`);
+    const kinds = kindsOf(type), more = Object.entries(given).map(([key, x]) => `${word(key)}=${kinds.get(key) === 'body' ? quoted(x) : value(x)}`);
+    const unknown = Object.keys(given).find(key => !kinds.has(key) && !['guess', 'corners'].includes(key));
+    if (unknown !== undefined) throw new ModelProblem(`${name}: ${JSON.stringify(unknown)} is not known. Take it out.`);
+    lines.push(`m.add(kc.${type}(${[quoted(name), ...more].join(', ')}))`);
   }
   for (const { name, body, local } of file.points ?? []) lines.push(`m.point(${[quoted(name), quoted(body), value(local)].join(', ')})`);
   return `${lines.join('\n')}\n`;
@@ -37,7 +40,7 @@ export function writePython(file) {
 function partText(part, value) {
   const [[kind, name], ...given] = Object.entries(part);
   const positional = { link: ['joints'], wheel: ['joint'], slider: ['joints', 'along'], slot: ['along'], drive: ['value'], gear: [], point: [] }[kind];
-  if (!positional) throw new Error(`a part ${kind} is not known`);
+  if (!positional) throw new ModelProblem(`a part ${kind} is not known. Take it out.`);
   const first = positional.map(key => (key === 'value' || key === 'along' && typeof part[key] !== 'string' ? value(part[key]) : quoted(part[key])));
   const rest = given.filter(([key]) => !positional.includes(key));
   const texts = new Set(['on', 'against', 'i', 'j', 'centre_i', 'centre_j', 'joint', 'joints']);
@@ -49,8 +52,14 @@ function partText(part, value) {
 
 /* A word of Python: a name of a file is none, if it is not one already. */
 function word(text) {
-  if (!/^[A-Za-z]\w*$/.test(text)) throw new Error(`${JSON.stringify(text)} is no name`);
+  if (!/^[A-Za-z]\w*$/.test(text)) throw new ModelProblem(`${JSON.stringify(text)} is no name. Rename it.`);
   return text;
+}
+
+/* The arguments of a type, and what each is. */
+function kindsOf(type) {
+  if (!Object.hasOwn(kernels.types, type)) throw new ModelProblem(`the type ${JSON.stringify(type)} is not known. Change it.`);
+  return new Map(kernels.types[type].arguments.map(([key, kind]) => [key, kind]));
 }
 
 const variable = name => `p_${word(name)}`;
@@ -79,6 +88,7 @@ function treeOf(text) {
   }
 }
 
+const PLAIN = ['cot', 'sec', 'csc'];
 const SYMBOLS = { t: 'kc.t', alpha: 'kc.alpha', pi: 'kc.pi', deg: 'kc.deg' };
 
 function isKnown(tree, names) {
@@ -93,8 +103,9 @@ function formulaText(tree, names) {
     case 'name': return names.has(tree.name) ? variable(tree.name) : SYMBOLS[tree.name];
     case 'neg': return `(-${of(tree.a)})`;
     case 'call': {
-      const name = word(tree.name), given = tree.given.map(of).join(', ');
+      const { name } = tree, given = tree.given.map(of).join(', ');
       const title = Object.keys(kernels.titles).find(key => kernels.titles[key] === name);
+      if (!title && !Object.hasOwn(kernels.functions, OF_SYMPY[name] ?? name) && !PLAIN.includes(name)) throw new ModelProblem(`the function ${JSON.stringify(name)} is not known. Write another.`);
       return title ? `kc.motion.law(${quoted(title)})(${given})` : `sympy.${OF_SYMPY[name] ?? name}(${given})`;
     }
     case '^': return `(${of(tree.a)})**(${of(tree.b)})`;

@@ -72,6 +72,10 @@ NOT_LOADED = {
         f"{EXTRA} {LARGE} {SPACE} kincompile.derivations kincompile.checker"
     ),
     "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivations",
+    "editor MODEL -o PAGE.html": (
+        f"{EXTRA} {LARGE} {RANK} {SPACE} kincompile.derivations kincompile.checker "
+        "kincompile.verification kincompile.view.page"
+    ),
     "equilibrium HEAVY": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} scipy.interpolate",
     "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verification",
     "mark KIT": "rich platformdirs matplotlib kincompile.view.page kincompile.verification",

@@ -11,12 +11,13 @@ import pytest
 from kincompile.errors import TemplateError
 from kincompile.report.templates import template_root
 from kincompile.view import modules
+from kincompile.view.editor import MODULES
 from kincompile.view.modules import WORLDS, joined, modules_of, without_imports
 
 ROOT = Path(__file__).resolve().parents[3]
 LINT = ROOT / ".ci" / "page"
 VIEW = ROOT / "templates" / "view"
-ENTRIES = ("start.js", "gallery.js")
+ENTRIES = ("start.js", "gallery.js", "editor.js")
 
 
 def read_by_tsc(page):
@@ -36,8 +37,9 @@ def test_that_every_script_is_read_by_tsc():
 @pytest.mark.parametrize("dimension", WORLDS)
 def test_that_no_name_is_declared_by_two_modules(dimension):
     """They share one scope in a page."""
-    for entry in ENTRIES:
-        text = joined(modules_of(entry, dimension))
+    pages = [*(modules_of(entry, dimension) for entry in ("start.js", "gallery.js")), MODULES]
+    for names in pages:
+        text = joined(names)
         found = re.findall(
             r"^(?:async function|function|class|const|let) (\w+)", text, re.MULTILINE
         )

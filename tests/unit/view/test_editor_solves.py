@@ -1,0 +1,336 @@
+"""The editor's model in node: kernels, factors, formulas and files against kincompile's own."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy
+
+import kincompile as kc
+from kincompile.emitters.javascript.kernels import kernels_script
+from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.view.editor import editor_page
+from tests.page_modules import in_node
+
+ROOT = Path(__file__).resolve().parents[3]
+EXAMPLES = sorted(
+    path
+    for folder in ("examples", "examples/exercises", "examples/synthesis", "examples/transmissions")
+    for path in (ROOT / folder).glob("*.toml")
+    if "space = 3" not in path.read_text(encoding="utf-8")
+)
+REFUSED = {
+    "cam_by_table": "a cam given by a table",
+    "example_3_7_5": "coordinates of free equations",
+    "problem_3_5_6": "coordinates of free equations",
+}
+"""Examples in the plane that the editor does not open, and what it says."""
+
+MODULES = """
+import { Bound } from './bound.js';
+import { modelOf } from './sketched.js';
+import { readToml, writeToml } from './toml.js';
+import { Factors } from './sparse.js';
+import { driverOf, jetOf } from './formula.js';
+import { Editing } from './editing.js';
+import { writePython } from './python_text.js';
+import * as hand from './edits.js';
+const solved = text => {
+  const model = modelOf(readToml(text)), bound = new Bound(model), last = Math.max(model.count - 1, 1);
+  const t = Float64Array.from({ length: model.count }, (_, k) => model.end * k / last);
+  const { q, q_dot, q_ddot, failed } = bound.solver.solve(bound, t);
+  return { names: bound.COORDINATES, failed: failed?.index ?? null, q: [...q], q_dot: [...q_dot], q_ddot: [...q_ddot] };
+};
+"""
+
+
+def run(program, given=None):
+    """Return what a program tells that has the modules of the editor's model."""
+    return in_node(f"{kernels_script()}globalThis.kernels = kernels;\n{MODULES}{program}", given)
+
+
+def own_solution(model):
+    """Return the motion of a model over its own times."""
+    system = model.system()
+    return kc.solve(kc.compile(model), np.linspace(0, system.end, system.points))
+
+
+def require_equal(found, solution, name):
+    """Compare a motion of the page with kincompile's, relative to the size of each coordinate."""
+    assert found["names"] == list(solution.coordinates), name
+    assert (found["failed"] is None) == solution.success, name
+    for key in ("q", "q_dot", "q_ddot"):
+        wanted = getattr(solution, key)
+        numbers = np.array(found[key], dtype=float).reshape(wanted.shape)
+        scale = np.nanmax(np.abs(wanted), axis=0, initial=1.0)
+        np.testing.assert_allclose(numbers / scale, wanted / scale, rtol=0, atol=1e-9, err_msg=name)
+
+
+# ---- kernels -----------------------------------------------------------------------------------
+
+BODIES = {"i": "one", "j": "other"}
+PROFILE = "0.7 + 0.1*cos(2*alpha) + 0.05*sin(alpha)**2"
+DRIVEN = "0.6 + 0.2*sin(2*t)"
+OF_KIND = {"body": BODIES.get, "profile": lambda _: PROFILE, "value": lambda _: DRIVEN}
+OF_KIND["distance"] = OF_KIND["value"]
+
+
+def model_of(name):
+    """Return a file with one constraint of a type, with numbers that mean nothing."""
+    rng = np.random.default_rng(sum(map(ord, name)))
+    lines = [f'type = "{name}"', 'name = "k"']
+    for key, item in CONSTRAINTS[name].arguments().items():
+        kind = item.kind.name.lower()
+        if kind in OF_KIND:
+            value = json.dumps(OF_KIND[kind](item.symbol))
+        else:
+            value = rng.uniform(0.3, 1, 2).tolist() if kind in ("point", "axis") else rng.uniform()
+        lines.append(f"{key} = {value}")
+    bodies = 'bodies = [{ name = "one" }, { name = "other" }]'
+    return f'kincompile = 1\nname = "m"\n{bodies}\n[[constraints]]\n' + "\n".join(lines) + "\n"
+
+
+def test_that_every_type_has_the_values_of_the_emitted_module(tmp_path):
+    """Off the manifold, at numbers without a pattern."""
+    given, wanted = [], []
+    for k, name in enumerate(CONSTRAINTS):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(model_of(name), encoding="utf-8")
+        written = path.with_suffix(".py")
+        written.write_text(kc.emit(kc.read(path), "numpy").source, encoding="utf-8")
+        module = kc.load(written)
+        rng = np.random.default_rng(k)
+        q, q_dot = rng.normal(size=(2, module.N_COORDINATES))
+        given.append([model_of(name), q.tolist(), q_dot.tolist(), 0.3])
+        p = np.array(module.DEFAULTS)
+        wanted.append(
+            [module.Phi(q, 0.3, p), module.Phi_q(q, 0.3, p), module.nu(q, 0.3, p),
+             module.gamma(q, q_dot, 0.3, p)]
+        )  # fmt: skip
+    found = run(
+        """tell(given.map(([text, q, q_dot, t]) => {
+  const bound = new Bound(modelOf(readToml(text))), at = bound.point();
+  at.q.set(q);
+  at.q_dot.set(q_dot);
+  at.t = t;
+  bound.position_at(at);
+  bound.nu_at(at);
+  bound.gamma_at(at);
+  return [at.Phi, bound.rows_of(at), at.nu, at.gamma].map(x => Array.from(x));
+}));""",
+        given,
+    )
+    for name, one, other in zip(CONSTRAINTS, found, wanted, strict=True):
+        for here, there in zip(one, other, strict=True):
+            np.testing.assert_allclose(here, there, rtol=1e-13, atol=1e-13, err_msg=name)
+
+
+# ---- motions of files --------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_that_examples_move_as_kincompile_solves_them():
+    texts = {path.stem: path.read_text(encoding="utf-8") for path in EXAMPLES}
+    found = run(
+        """tell(given.map(text => {
+  try { return solved(text); } catch (error) { return error.message; }
+}));""",
+        list(texts.values()),
+    )
+    refused = {}
+    for path, item in zip(EXAMPLES, found, strict=True):
+        if isinstance(item, str):
+            refused[path.stem] = item
+        else:
+            require_equal(item, own_solution(kc.read(path)), path.stem)
+    assert refused.keys() == REFUSED.keys()
+    assert all(text in refused[name] for name, text in REFUSED.items())
+
+
+DRAWN = """
+const drawn = new Editing(), draw = edit => drawn.edit(edit), files = {};
+draw(file => {
+  const [A, B, C, D] = [[0, 0], [0.3, 0.8], [2, 1.5], [2, 0]].map((place, k) => hand.addJoint(file, place, k % 3 === 0));
+  [[A, B], [B, C], [D, C]].forEach(joints => hand.addLink(file, joints));
+  hand.extendLink(file, 'link2', hand.addJoint(file, [1.2, 2]));
+  hand.addDriver(file, 'link1');
+});
+files.fourBar = writeToml(drawn.file);
+draw(file => hand.moveJoint(file, 'B', [0.35, 0.6]));
+files.pulled = writeToml(drawn.file);
+draw(file => {
+  const [F] = [[3.5, 1]].map(place => hand.addJoint(file, place));
+  hand.addLink(file, ['C', F]);
+  hand.addSlider(file, F, [1, 0]);
+});
+files.slider = writeToml(drawn.file);
+const geared = new Editing();
+geared.edit(file => {
+  const [A, B] = [[0, 0], [1.5, 0]].map(place => hand.addJoint(file, place, true));
+  hand.addGear(file, A, B);
+  hand.addDriver(file, 'wheel1');
+});
+files.gears = writeToml(geared.file);
+const lifted = new Editing();
+lifted.edit(file => {
+  const [A, B, C] = [[0, 0], [1, 0.4], [0.3, -0.5]].map((place, k) => hand.addJoint(file, place, k !== 1));
+  hand.addLink(file, [A, B]);
+  hand.addCylinder(file, C, B);
+});
+files.cylinder = writeToml(lifted.file);
+const slotted = new Editing();
+slotted.edit(file => {
+  const [A, B, C, D] = [[0, 0], [0.4, 0.1], [-0.5, -0.6], [0.8, 0.7]].map((place, k) => hand.addJoint(file, place, k % 2 === 0));
+  hand.addLink(file, [A, B]);
+  hand.addLink(file, [C, D]);
+  hand.addSlot(file, B, 'C D');
+  hand.addDriver(file, 'link1');
+  hand.sketchOf(file).parts.at(-1).value = { points: [[0, 0.2], [0.4, 0.8], [0.6, 0.8], [1, 0.2]], law: 'cycloidal' };
+});
+files.slot = writeToml(slotted.file);
+"""
+
+
+@pytest.mark.slow
+def test_that_what_is_drawn_and_saved_moves_as_kincompile_solves_it(tmp_path):
+    drawn = DRAWN.replace("  hand.addPoint;\n", "").replace("[F] = [[3.5, 1]]", "[F] = [[3.5, 1]]")
+    program = f"{drawn}tell(Object.fromEntries(Object.entries(files).map(([name, text]) => "
+    program += "[name, { text, python: writePython(readToml(text)), ...solved(text) }])));"
+    found = run(program)
+    assert len(found) == 6
+    for name, item in found.items():
+        path = tmp_path / f"{name}.toml"
+        path.write_text(item["text"], encoding="utf-8")
+        model = kc.read(path)
+        require_equal(item, own_solution(model), name)
+        names: dict[str, kc.Mechanism] = {}
+        exec(item["python"], names)
+        require_equal(item, own_solution(names["m"]), f"{name} as Python")
+
+
+# ---- parts -------------------------------------------------------------------------------------
+
+
+def test_that_sparse_factors_solve_and_give_the_determinant():
+    rng = np.random.default_rng(4)
+    given = []
+    for n in (1, 3, 12, 40):
+        matrix = np.where(rng.uniform(size=(n, n)) < 3 / n, rng.normal(size=(n, n)), 0)
+        matrix[rng.permutation(n), np.arange(n)] += 2
+        places = np.argwhere(matrix)
+        later = [matrix[i, j] * rng.uniform(-1, 1) for i, j in places]
+        given.append([places.tolist(), [matrix[i, j] for i, j in places], later, n])
+    found = run(
+        """tell(given.map(([pattern, first, later, n]) => {
+  const factors = new Factors(pattern, [...Array(n).keys()], Array(n).fill(1));
+  return [first, later].map(entries => {
+    const x = new Float64Array(n);
+    factors.factor(Float64Array.from(entries));
+    factors.solve(Float64Array.from({ length: n }, (_, k) => k + 1), x);
+    return [[...x], factors.determinant];
+  });
+}));""",
+        given,
+    )
+    for (places, first, later, n), results in zip(given, found, strict=True):
+        for entries, (x, determinant) in zip((first, later), results, strict=True):
+            matrix = np.zeros((n, n))
+            matrix[tuple(np.array(places).T)] = entries
+            np.testing.assert_allclose(matrix @ x, np.arange(1, n + 1), atol=1e-8)
+            np.testing.assert_allclose(determinant, np.linalg.det(matrix), rtol=1e-8)
+
+
+FORMULAS = (
+    "a*sin(2*pi*t)**2/(1+t^2) - 3e-1", "exp(-t)*cos(t)", "sqrt(1 + a*t)", "t**3 - 2*t**-2",
+    "(1+t)**1.5", "a**t", "-t**2", "tan(t)*atan(t) + asin(t/3)", "2*-t", "cot(t) + sec(t) + ln(t)",
+    "cosh(t)*sinh(t)/tanh(t)", "30*deg*t", "t*acosh(1 + t) - atanh(t/4) + asinh(t) + acos(t/5)",
+)  # fmt: skip
+
+
+def test_that_formulas_have_the_derivatives_of_sympy():
+    found = run(
+        "tell(given.map(text => jetOf(text, new Map([['a', 1.7]]), 't')(0.4)));", FORMULAS
+    )
+    t, a = sympy.symbols("t a")
+    names = {"t": t, "a": a, "deg": sympy.pi / 180}
+    for text, jet in zip(FORMULAS, found, strict=True):
+        value = sympy.sympify(text.replace("^", "**"), names)
+        wanted = [float(value.diff(t, k).subs({t: 0.4, a: 1.7})) for k in range(4)]
+        np.testing.assert_allclose(jet, wanted, rtol=1e-12, err_msg=text)
+
+
+HOSTILE = {
+    "constructor": "there is no body|no joint|type",
+    'kincompile = 1\nname = "m"\n[__proto__]\nx = 1\n': "",
+    "x = " + "[" * 5000: "levels",
+    "a" * 1_100_000: "characters",
+    'kincompile = 1\nx = "\\ud800': "text",
+    "kincompile = 2": "no model",
+    'kincompile = 1\n[sketch]\nground = { A = "1" }\n': "pair",
+    'kincompile = 1\n[sketch]\nparts = [{ link = "a", joints = "A B" }]\n': "no joint A",
+    'kincompile = 1\nbodies = [{ name = "b" }]\n[[constraints]]\ntype = "constructor"\nname = "k"\n': "type",
+    'kincompile = 1\nanalysis = { end = 1, points = 1e9 }\n': "number of times",
+    'kincompile = 1\nspace = 3\n': "space",
+    "{": "JSON",
+    'kincompile = 1\nbodies = [{ name = "b" }]\n[[constraints]]\ntype = "AbsoluteAngle"\nname = "k"\nbody = "b"\nangle = "constructor(t)"\n': "no function",
+    'kincompile = 1\nbodies = [{ name = "b" }]\n[[constraints]]\ntype = "AbsoluteAngle"\nname = "k"\nbody = "b"\nangle = "' + "(" * 900 + '"\n': "levels",
+}  # fmt: skip
+
+
+def test_that_hostile_files_are_refused_and_leave_the_model():
+    """Within a second together, and without a change of any prototype."""
+    found = run(
+        """const begin = Date.now(), said = given.map(text => {
+  const editing = new Editing();
+  try { editing.openText(text); } catch (error) { return [error.message, Object.keys(editing.file).length]; }
+  return ['', editing.problem];
+});
+tell({ said, time: Date.now() - begin, x: {}.x ?? null });""",
+        list(HOSTILE),
+    )
+    assert found["x"] is None
+    assert found["time"] < 5000
+    for (text, wanted), (message, _) in zip(HOSTILE.items(), found["said"], strict=True):
+        assert bool(message) or not wanted, text[:60]
+        if wanted and text != "constructor":
+            assert wanted in message, (text[:80], message)
+
+
+PYTHON = """kincompile = 1
+name = "m\\"); import os; (\\""
+parameters = [{ name = "a", default = 1 }]
+bodies = [{ name = "a" }]
+[[constraints]]
+type = "AbsoluteAngle"
+name = "k"
+body = "a"
+angle = "a*t"
+"""
+
+
+def test_that_no_text_of_a_file_becomes_python():
+    found = run("tell(writePython(readToml(given)));", PYTHON)
+    names: dict[str, kc.Mechanism] = {}
+    quoted = r'"m\"); import os; (\""'
+    assert quoted in found
+    exec(found.replace(quoted, '"m"'), names)
+    own_solution(names["m"])
+    changes = ('name = "a"', 'name = "a; import os"'), ("a*t", "__import__(t)"), ("a*t", "sympify(t)")
+    changes += ("AbsoluteAngle", "mechanism"), ("body =", "x_y__z__ ="), ("angle =", '"angle=1, x" =')
+    told = run(
+        """tell(given.map(text => {
+  try { return writePython(readToml(text)); } catch (error) { return error.message; }
+}));""",
+        [PYTHON.replace(*change) for change in changes],
+    )
+    for text in told:
+        assert "is no name" in text or "is not known" in text, text
+
+
+def test_that_the_editor_is_one_file_of_at_most_700_kilobytes():
+    page = editor_page()
+    assert len(page.encode()) <= 700_000
+    assert "</script><script>alert" not in editor_page("</script><script>alert(1)</script>")
+    assert "src=" not in page
+    assert "://" not in page
