@@ -89,6 +89,7 @@ from kincompile.sweeps.sweep import sweep as sweep
 from kincompile.verification.verify import verify as verify
 from kincompile.view.animation import animate as animate
 from kincompile.view.draw import draw as draw
+from kincompile.view.editor import editor as editor
 from kincompile.view.gallery import assembly_gallery as assembly_gallery
 from kincompile.view.gallery import gallery as gallery
 from kincompile.view.mechanism_plot import plot_mechanism as plot_mechanism

@@ -212,6 +212,7 @@ def _write_motions() -> None:
         write(GENERATED / "motions", {f"{last}.svg": shown})
         kc.page(kc.read_model(model)).write(live)
     kc.page(_wiper()).write(live_folder / "wiper.html")
+    kc.editor().write(live_folder / "editor.html")
     for name in lessons.NAMES:
         kc.page(lessons.Lesson(name).model).write(live_folder / f"lesson_{name}.html")
 

@@ -26,8 +26,8 @@ from kincompile.names import escaped_lines
 
 COMMANDS = (
     "assemblies", "compare", "compile", "convert", "derive", "draw", "editor", "equilibrium",
-    "exercise", "fit", "inspect", "mark", "run", "schema", "simulate", "sweep", "tolerance", "transmission",
-    "view",
+    "exercise", "fit", "inspect", "mark", "run", "schema", "simulate", "sweep", "tolerance",
+    "transmission", "view",
 )  # fmt: skip
 """The commands: each is the `command` of the file of its name."""
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import sys
+from contextlib import redirect_stdout
 
 import click
 
-from kincompile.cli.shared import output_option, read_model, require_output
-from kincompile.errors import InputError
-from kincompile.view.editor import editor_page
-from kincompile.writing import write_atomically
+import kincompile as kc
+from kincompile.cli.shared import output_option, require_output
 
 
 @click.command("editor")
@@ -23,14 +22,6 @@ def command(model: str | None, output: str) -> None:
     """
     if model is not None:
         require_output(output, model, "the model itself")
-    if Path(output).suffix not in (".html", ".htm"):
-        raise InputError(f"cannot write {output}: end its name in .html")
-    page = editor_page("" if model is None else _text_of(model))
-    click.echo(f"Wrote {write_atomically(output, page)}", err=True)
-
-
-def _text_of(model: str) -> str:
-    """Return a model as the text of a file: as it is written, where it is one."""
-    mechanism = read_model(model)
-    path = Path(model)
-    return path.read_text("utf-8") if path.suffix in (".toml", ".json") else mechanism.to_toml()
+    with redirect_stdout(sys.stderr):
+        made = kc.editor(model)
+    click.echo(f"Wrote {made.write(output)}", err=True)

@@ -3,27 +3,81 @@
 from __future__ import annotations
 
 import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from kincompile.emitters.javascript.kernels import kernels_script
+from kincompile.files.files import read_model
+from kincompile.html import framed_html
 from kincompile.report.templates import fill, read
 from kincompile.runtime.singular.events import SENTENCES
 from kincompile.view.modules import joined
+from kincompile.view.page import FRAME_HEIGHT, write_html
 from kincompile.view.shapes import tables
+
+if TYPE_CHECKING:
+    from kincompile.model.mechanism import Mechanism
+    from kincompile.model.system import ConstraintSystem
 
 MODULES = (
     "draw.js", "plane.js", "formula.js", "toml.js", "sketched.js", "sparse.js", "bound.js",
     "edits.js", "editing.js", "model_marks.js", "python_text.js", "board.js", "editor.js",
 )  # fmt: skip
-"""The modules of the editor, in order."""
+"""The modules of the editor, in order; of those of the page it has what draws marks."""
 
 LARGEST_FILE = 1_000_000
 """Bytes of a file that the editor opens."""
 
 
-def editor_page(text: str = "") -> str:
-    """Return the editor as HTML, with a model file open in it, if there is one."""
+@dataclass(frozen=True, slots=True)
+class Editor:
+    """An editor that is ready to be written.
+
+    Attributes
+    ----------
+    html
+        The whole page: kernels, style sheets and scripts. It loads nothing else.
+    """
+
+    html: str
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write the editor to a file, in one step, and return its path.
+
+        Raises
+        ------
+        InputError
+            When the name does not end in .html or .htm, or the file cannot be written.
+        """
+        return write_html(path, self.html)
+
+    def _repr_html_(self) -> str:
+        return framed_html(self.html, "editor", FRAME_HEIGHT)
+
+    def __repr__(self) -> str:
+        """Return the size."""
+        return f"<Editor: {len(self.html) / 1e6:.2f} MB>"
+
+
+def editor(
+    model: Mechanism | ConstraintSystem | str | os.PathLike[str] | None = None,
+) -> Editor:
+    """Return a page in which a mechanism in the plane is drawn, moves at once and is saved.
+
+    Parameters
+    ----------
+    model
+        A model that is open in it, or the path of one. A model file stays as it is written.
+
+    Raises
+    ------
+    ModelError
+        If the model cannot be used as written, or a file cannot hold it.
+    """
     data = {
-        "file": text,
+        "file": _text_of(model),
         "tables": tables(),
         "sentences": dict(SENTENCES),
         "largest": LARGEST_FILE,
@@ -34,4 +88,15 @@ def editor_page(text: str = "") -> str:
         "data": json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
         "scripts": [kernels_script(), joined(MODULES)],
     }
-    return fill("view/editor.html.jinja", slots)
+    return Editor(fill("view/editor.html.jinja", slots))
+
+
+def _text_of(model: Mechanism | ConstraintSystem | str | os.PathLike[str] | None) -> str:
+    """Return a model as the text of a file: as it is written, where it is one."""
+    if model is None:
+        return ""
+    if not isinstance(model, str | os.PathLike):
+        return model.to_toml()
+    written = read_model(model)
+    path = Path(model)
+    return path.read_text("utf-8") if path.suffix in (".toml", ".json") else written.to_toml()

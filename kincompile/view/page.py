@@ -89,9 +89,7 @@ class Page:
         InputError
             When the name does not end in .html or .htm, or the file cannot be written.
         """
-        if Path(path).suffix not in (".html", ".htm"):
-            raise InputError(f"cannot write {path}: end its name in .html")
-        return write_atomically(path, self.html)
+        return write_html(path, self.html)
 
     def _repr_html_(self) -> str:
         return framed_html(self.html, self.name, FRAME_HEIGHT)
@@ -99,6 +97,13 @@ class Page:
     def __repr__(self) -> str:
         """Return the name and the size."""
         return f"<Page of {self.name!r}: {len(self.html) / 1e6:.2f} MB>"
+
+
+def write_html(path: str | os.PathLike[str], html: str) -> Path:
+    """Write a page to a file whose name says so, in one step, and return its path."""
+    if Path(path).suffix not in (".html", ".htm"):
+        raise InputError(f"cannot write {path}: end its name in .html")
+    return write_atomically(path, html)
 
 
 def page(

@@ -259,7 +259,7 @@ function fromSegment([x, y], [a, b], [c, d]) {
   return Math.hypot(x - a - part * u, y - b - part * v);
 }
 
-/** What the board does with pointers and keys: `act` is told of presses in the world.
+/** What the board does with pointers and keys: `act` takes presses in the world.
  * @param {Board} board
  * @param {{ press: Function, pull: Function, release: Function, hover: Function, changed: Function }} act */
 export function connectPointers(board, act) {

@@ -43,7 +43,7 @@ export class Editing {
     this.future = [];
   }
 
-  /** Change the file; a step of undo unless it goes on with the last one.
+  /** Change the file; a step of undo unless it continues the last one.
    * @param {(file: any) => any} edit @param {{ goesOn?: boolean }} [how] */
   edit(edit, { goesOn = false } = {}) {
     const before = JSON.stringify(this.file);

@@ -24,7 +24,7 @@ const TOOLS = [
 const TWO_ENDED = new Set(['link', 'slider', 'slot', 'gear', 'cylinder']);
 const PLEASANT_TIME = 4000;  // ms that a motion takes, played
 const FAST = 5;  // steps of the grid that an arrow takes with Shift
-const MOST_TOLD = 4;  // decimals of places that are told
+const DECIMALS_SAID = 4;  // of places
 
 const given = JSON.parse(document.getElementById('data').textContent);
 /** @param {string} id @returns {any} */
@@ -144,7 +144,7 @@ const editor = {
       this.settle(file);
       return place && moveJoint(file, joint, place);
     }, { goesOn: true, isPull: true });
-    if (place) told(`${joint} at ${placeText(place)}`);
+    if (place) announce(`${joint} at ${placeText(place)}`);
   },
 
   letGo() {
@@ -322,14 +322,14 @@ function made(tag, text = '') {
 }
 
 const isExpected = error => [ModelProblem, FormulaError, FileError, SyntaxError].some(kind => error instanceof kind);
-const placeText = place => place.map(x => Number(x.toFixed(MOST_TOLD))).join(', ');
+const placeText = place => place.map(x => Number(x.toFixed(DECIMALS_SAID))).join(', ');
 
 function say(text) {
   part('message').textContent = text;
   part('message').hidden = !text;
 }
 
-function told(text) {
+function announce(text) {
   part('said').textContent = text;
 }
 
@@ -368,7 +368,7 @@ function onBoard(event) {
     const from = board.cursor ? board.snapped(board.cursor) : board.snapped(board.view.toWorld([board.width / 2, board.height / 2]));
     board.cursor = arrow.map((x, k) => from[k] + x * board.step * (event.shiftKey ? FAST : 1));
     if (board.held) editor.bring(board.held, board.snapped(board.cursor));
-    else told(`${placeText(board.cursor)}${board.jointAt(board.cursor) ? `, joint ${board.jointAt(board.cursor)}` : ''}`);
+    else announce(`${placeText(board.cursor)}${board.jointAt(board.cursor) ? `, joint ${board.jointAt(board.cursor)}` : ''}`);
     editor.draw();
   } else if (key === 'Enter' && board.cursor) {
     if (board.held) editor.letGo();
@@ -423,7 +423,7 @@ function fit() {
 function nextAssembly() {
   const found = editing.assemblies();
   if (found.length < 2) {
-    told(found.length ? 'One assembly was found.' : 'There is no assembly.');
+    announce(found.length ? 'One assembly was found.' : 'There is no assembly.');
     part('assembled').textContent = found.length ? 'one assembly found' : 'no assembly';
     return;
   }

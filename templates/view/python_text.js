@@ -50,7 +50,7 @@ function partText(part, value) {
   return `s.${kind}(${[quoted(name), ...first, ...more, ...kept.length ? [`**{${kept.join(', ')}}`] : []].join(', ')})`;
 }
 
-/* A word of Python: a name of a file is none, if it is not one already. */
+/* A word of Python: a name in a file that is no such word is refused. */
 function word(text) {
   if (!/^[A-Za-z]\w*$/.test(text)) throw new ModelProblem(`${JSON.stringify(text)} is no name. Rename it.`);
   return text;

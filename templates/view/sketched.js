@@ -306,7 +306,7 @@ export function modelOf(file) {
   }
   for (const part of listOf(drawing.parts)) {
     const kind = Object.keys(PARTS).find(key => known(part, key));
-    if (!kind) throw new ModelProblem(`a part of the drawing is none of ${Object.keys(PARTS).join(', ')}. Name what it is.`);
+    if (!kind) throw new ModelProblem(`a part of the drawing has no kind. Write one of ${Object.keys(PARTS).join(', ')}.`);
     within(`${kind} ${part[kind]}`, () => PARTS[kind](sketch, part));
   }
   for (const { name, guess = [0, 0, 0], outline } of listOf(file.bodies)) {

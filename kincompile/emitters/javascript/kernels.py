@@ -1,8 +1,8 @@
 """The kernels of all types in the plane as one script, each once, for what is drawn in a browser.
 
-An emitted module has the code of one mechanism. This script has the code of every type of constraint
-in its own inputs, from the same derivation, so that a script may bind instances of them to bodies
-and numbers that no compiler has seen; and the solver for any number of coordinates.
+An emitted module has the code of one mechanism. This script has that of every type of constraint in
+its own inputs, from the same derivation, so that another script binds instances of them to bodies
+and numbers; and the solver for any number of coordinates.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ WORDS = (*RESERVED, "v", "from", "row", "places", "u", "ramp", "exponent")
 
 
 def kernels_script() -> str:
-    """Return the script that declares `kernels`: `types`, `laws`, `titles`, `functions`, `solverOf`."""
+    """Return the script that declares `kernels`: types, laws, functions and the solver."""
     return fill(
         "javascript/kernels.js.jinja",
         {
@@ -145,7 +145,9 @@ def _steps(scheduler: Scheduler, nodes: Sequence[Node], outputs: Sequence[int]) 
 def _frame() -> list[str]:
     """Return the function that puts what the frame of a body gives into values."""
     kernel = frame_kernel(PLANAR.frame("i"))
-    names = {k: f"v[first + {node[1]}]" for k, node in enumerate(kernel.nodes) if node[0] == "input"}
+    names = {
+        k: f"v[first + {node[1]}]" for k, node in enumerate(kernel.nodes) if node[0] == "input"
+    }
     printer = Printer(JAVASCRIPT, kernel.nodes, names)
     lines = [f"v[place + {k}] = {printer.text(node)};" for k, node in enumerate(kernel.entries)]
     return braced(["function frame(v, first, place) {"], lines)

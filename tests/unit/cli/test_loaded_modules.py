@@ -74,7 +74,7 @@ NOT_LOADED = {
     "compare MODEL HAND": "rich platformdirs matplotlib kincompile.view kincompile.derivations",
     "editor MODEL -o PAGE.html": (
         f"{EXTRA} {LARGE} {RANK} {SPACE} kincompile.derivations kincompile.checker "
-        "kincompile.verification kincompile.view.page"
+        "kincompile.verification"
     ),
     "equilibrium HEAVY": f"{PAGES} {LARGE} {EXTRA} {LANGUAGES} scipy.interpolate",
     "exercise MODEL -o FOLDER": f"{EXTRA} {LARGE} kincompile.view.page kincompile.verification",
