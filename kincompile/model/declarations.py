@@ -160,23 +160,42 @@ def body_coordinates(
 
 
 def check_outlines(bodies: tuple[Body, ...], values: dict[str, float], problems: list[str]) -> None:
-    """Check that every outline is a list of corners, or none."""
+    """Check that every outline is a list of corners, in space a list of such lists, or none."""
     for body in bodies:
         where = f"outline of {body.name}"
-        try:
-            corners = [tuple(corner) for corner in body.outline]
-        except TypeError:
-            problems.append(f"{where}: {body.outline!r} is not a list of corners (xi, eta)")
+        if body.kind.frame.size == len(_PLANE):
+            _check_corners(body.outline, where, "a polygon", _PLANE, values, problems)
             continue
-        if len(corners) in (1, 2):
-            problems.append(f"{where}: it has {len(corners)} corners; a polygon has 3 or more")
-        for k, corner in enumerate(corners, 1):
-            if len(corner) != 2:
-                problems.append(
-                    f"{where}: corner {k}, {corner!r}, is not a pair (xi, eta); give two numbers"
-                )
-            for number in corner:
-                checked_number(number, f"{where}, corner {k}", values, problems)
+        for k, solid in enumerate(body.outline, 1):
+            _check_corners(solid, f"{where}, solid {k}", "a solid", _SPACE, values, problems)
+
+
+_PLANE, _SPACE = ("xi", "eta"), ("xi", "eta", "zeta")
+
+
+def _check_corners(
+    given: Any,
+    where: str,
+    what: str,
+    axes: Sequence[str],
+    values: dict[str, float],
+    problems: list[str],
+) -> None:
+    components, least = f"({', '.join(axes)})", len(axes) + 1
+    try:
+        corners = [tuple(corner) for corner in given]
+    except TypeError:
+        problems.append(f"{where}: {given!r} is not a list of corners {components}")
+        return
+    if 0 < len(corners) < least:
+        problems.append(f"{where}: it has {len(corners)} corners; {what} has {least} or more")
+    for k, corner in enumerate(corners, 1):
+        if len(corner) != len(axes):
+            is_one = f"is not a pair {components}; give two numbers"
+            is_one = is_one if len(axes) == 2 else f"is not {components}; give three numbers"
+            problems.append(f"{where}: corner {k}, {corner!r}, {is_one}")
+        for number in corner:
+            checked_number(number, f"{where}, corner {k}", values, problems)
 
 
 def free_coordinates(

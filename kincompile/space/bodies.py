@@ -88,6 +88,12 @@ class Placed:
         kinds.components(3, words="[xi, eta, zeta]"), "Centre of mass in the body's frame.",
         default=(0, 0, 0), unit="length", kw_only=True,
     )  # fmt: skip
+    outline: Any = given(
+        kinds.array(kinds.array(kinds.components(3, words="[xi, eta, zeta]"), 4))
+        | {"description": "a list of solids, each a list of corners [xi, eta, zeta], 4 or more"},
+        "The hulls of corners in the body's frame, for pictures.", default=(), unit="length",
+        kw_only=True,
+    )  # fmt: skip
 
 
 @declared(slots=True, repr=False)
@@ -104,7 +110,7 @@ class SpatialBody(Body):
     def written(self) -> Placed:
         """Return what a file has of it: Euler parameters, whichever way they were given."""
         given = {"mass": self.mass, "inertia": self.inertia, "centre": self.centre}
-        return Placed(self.name, self.guess[:3], self.guess[3:], **given)
+        return Placed(self.name, self.guess[:3], self.guess[3:], outline=self.outline, **given)
 
     @property
     def z(self) -> sympy.Expr:

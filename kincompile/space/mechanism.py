@@ -44,6 +44,7 @@ class Mechanism(PlanarMechanism):
         mass: Scalar | None = None,
         inertia: Any = None,
         centre: Scalars = (0, 0, 0),
+        outline: Any = (),
     ) -> SpatialBody:
         """Add a body and return it.
 
@@ -70,6 +71,9 @@ class Mechanism(PlanarMechanism):
             (J_xi, J_eta, J_zeta) or a matrix of three rows; numbers or expressions of parameters.
         centre
             Centre of mass (xi, eta, zeta) in the body's frame [length].
+        outline
+            Solids for pictures, each by the corners (xi, eta, zeta) of its hull in the body's frame
+            [length], 4 or more; without, a hull of its joint points is drawn.
 
         Warns
         -----
@@ -88,7 +92,9 @@ class Mechanism(PlanarMechanism):
             if remark:
                 warnings.warn(f"body {name!r}: {remark}", KincompileWarning, stacklevel=2)
         start = (*_flat(position), *p)
-        body = SpatialBody(name, start, problem=problem, mass=mass, inertia=inertia, centre=centre)
+        body = SpatialBody(
+            name, start, outline, problem=problem, mass=mass, inertia=inertia, centre=centre
+        )
         self.bodies.append(body)
         return body
 

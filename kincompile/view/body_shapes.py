@@ -23,16 +23,20 @@ SAME_POINT = 1e-9
 """Distance, relative to the coordinates, up to which two points of a body are one."""
 
 
-def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Polygon]:
+def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Polygon | Hull]:
     """Return the outlines of those bodies that have one.
 
     From back to front: the first body hides what slides in it.
     """
-    found = [
-        Polygon(geometry.frames[body.name], tuple(map(geometry.numbers, body.outline)))
-        for body in bodies
-        if len(body.outline)
-    ]
+    found: list[Polygon | Hull] = []
+    for body in bodies:
+        frame = geometry.frames[body.name]
+        if body.kind.frame.size > PLANE:
+            for solid in body.outline:
+                corners: tuple[Point, ...] = tuple(map(geometry.numbers, solid))
+                found.append(Hull(frame, corners, corners, "shell"))
+        elif len(body.outline):
+            found.append(Polygon(frame, tuple(map(geometry.numbers, body.outline))))
     return found[::-1]
 
 
@@ -51,7 +55,7 @@ def links(
     dimension
         2, or 3 in space, where a hull keeps all its points: its faces are found where it is drawn.
     """
-    outlined = {mark.frame for mark in marks if isinstance(mark, Polygon)}
+    outlined = {mark.frame for mark in marks if isinstance(mark, Polygon | Hull)}
     shown = {frame for mark in marks for frame in moves_with(mark)}
     found: list[Hull | Symbol] = []
     for frame in sorted(set(frames) - outlined):

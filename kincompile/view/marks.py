@@ -85,12 +85,14 @@ class FramePoint:
 class Hull:
     """A body as the convex hull of its joint points; two points are a bar, one is a dot.
 
-    `attached` are all its joint points, from which a page finds the hull for other parameters.
+    `attached` are all its joint points, from which a page finds the hull for other parameters. A
+    "shell" is a solid in space that its author gave, without rods along its edges.
     """
 
     frame: BodyFrame
     points: tuple[Point, ...]
     attached: tuple[Point, ...] = ()
+    style: str = "hull"
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +239,7 @@ def shape_of(mark: Mark) -> str:
             return "stand" if mark.first.frame == GROUND_FRAME else "pin"
         case Rail():
             return "track" if mark.style == "guide" else mark.style
-        case Span():
+        case Span() | Hull():
             return mark.style
         case Wheel():
             return "ring" if mark.is_internal else "wheel"

@@ -83,6 +83,7 @@ SOLIDS: Mapping[str, tuple[Piece, ...]] = {
         Piece("plate", "points", is_area=True),
         _solid("body", "edges", _tube(0.5), 8),
     ),
+    "shell": (Piece("plate", "points", is_area=True),),
     "knuckles": (
         _solid("body", "axis", _about(1.0, -2.3, -0.9)),
         _solid("body", "axis", _about(1.0, 0.9, 2.3)),

@@ -20,6 +20,7 @@ from kincompile.files.robots.robot import (
     Joint,
     Mass,
     Robot,
+    Shape,
     order_tree,
     placement,
 )
@@ -41,13 +42,17 @@ KEPT: Mapping[str, Sequence[str] | None] = {
     "weld": None, "site": (
         "name", "class", "pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "fromto",
     ),
+    "geom": (
+        "class", "type", "size", "fromto", "pos", "quat", "axisangle", "xyaxes", "zaxis", "euler",
+    ),
 }  # fmt: skip
 """Elements that are read, and their attributes where not all are."""
 REFUSED = ("replicate", "composite", "flexcomp", "attach", "plugin")
 """Macros that stand for more than they say, and code."""
+GEOMS = {2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box"}
 FREE, BALL, SLIDE = 0, 1, 2
 CONNECT, WELD, JOINT = 0, 1, 2
-"""Types of joints and of equalities, as MuJoCo counts them."""
+"""Types of shapes, of joints and of equalities, as MuJoCo counts them."""
 
 
 def read_mjcf(path: Path, root: Element) -> Robot:
@@ -68,11 +73,15 @@ def read_mjcf(path: Path, root: Element) -> Robot:
             "'kincompile[robots]'"
         ) from None
     reader = _MjcfReader(path)
-    text = reader.prepared(root)
-    try:
-        model = mujoco.MjSpec.from_string(text).compile()
-    except (ValueError, mujoco.FatalError) as error:
-        reader.problem(1, f"MuJoCo refuses this file: {' '.join(str(error).split())}; correct it")
+    reader.prepare(root)
+    for left_out in ("", "geom"):  # shapes are for pictures, and may be of files
+        try:
+            model = mujoco.MjSpec.from_string(reader.text(root, left_out)).compile()
+            break
+        except (ValueError, mujoco.FatalError) as error:
+            refused = " ".join(str(error).split())
+    else:
+        reader.problem(1, f"MuJoCo refuses this file: {refused}; correct it")
         reader.raise_problems()
     return reader.read(model)
 
@@ -85,15 +94,19 @@ class _MjcfReader(XmlReader):
         self._lines: dict[str, int] = {}
         self._heavy: set[str] = set()
         self._motors: list[str] = []
+        self._meshes: list[str] = []
         self._equalities: list[Element] = []
 
-    def prepared(self, root: Element) -> str:
-        """Return what MuJoCo is to read; note names, motors and lines."""
+    def prepare(self, root: Element) -> None:
+        """Put includes in their places; note names, motors and lines."""
         self._splice(root, ())
         self._check(root)
         self.raise_problems()
+
+    def text(self, root: Element, left_out: str) -> str:
+        """Return what MuJoCo is to read, without the elements of a tag."""
         pieces: list[str] = []
-        self._write(root, pieces, 1)
+        self._write(root, pieces, 1, left_out)
         return "".join(pieces)
 
     def _splice(self, element: Element, above: tuple[Path, ...]) -> None:
@@ -136,6 +149,8 @@ class _MjcfReader(XmlReader):
                 self.problem(child.line, text)
             if element.tag == "equality":
                 self._equalities.append(child)
+            if child.tag == "geom" and "mesh" in child.attributes:
+                self._meshes.append(child.attributes["mesh"])
             if child.tag == "body":
                 child.attributes.setdefault("name", f"body_{child.line}")
                 name = child.attributes["name"]
@@ -150,7 +165,7 @@ class _MjcfReader(XmlReader):
             text = f"the robot has {len(self._lines)} bodies; at most {MOST_LINKS} are read"
             self.problem(1, f"{text}: leave out a part")
 
-    def _write(self, element: Element, pieces: list[str], line: int) -> int:
+    def _write(self, element: Element, pieces: list[str], line: int, left_out: str) -> int:
         """Write an element where it was, as far as it is read; return the line that is reached."""
         given = element.attributes
         kept = KEPT[element.tag]
@@ -163,8 +178,9 @@ class _MjcfReader(XmlReader):
         if element.tag == "mujoco" and element.one("compiler") is None:
             pieces.append('<compiler boundmass="1e-9" boundinertia="1e-12"/>')
         for child in element.children:
-            if child.tag in KEPT or (element.tag == "default" and child.tag == "equality"):
-                line = self._write(child, pieces, line)
+            is_file = child.tag == "geom" and child.attributes.keys() & {"mesh", "hfield"}
+            if child.tag in KEPT and child.tag != left_out and not is_file:
+                line = self._write(child, pieces, line, left_out)
         pieces.append(f"</{element.tag}>")
         return line
 
@@ -180,6 +196,12 @@ class _MjcfReader(XmlReader):
             own = Mass(model.body_mass[k], np.zeros(3), np.diag(model.body_inertia[k]))
             self._body(model, k, name)
             robot.links[name] = own.seen_from(inertia) if name in self._heavy else None
+        for k in range(model.ngeom):
+            if kind := GEOMS.get(int(model.geom_type[k])):
+                at = placement(model.geom_pos[k], _matrix(model.geom_quat[k]))
+                body = self._bodies[model.geom_bodyid[k]]
+                robot.shapes.append(Shape.of(body, kind, model.geom_size[k].tolist(), at))
+        robot.meshes = self._meshes
         order_tree(robot, self)
         for k in range(model.neq):
             if model.eq_active0[k]:

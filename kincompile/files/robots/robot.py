@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +31,9 @@ FREEDOMS: Mapping[str, int] = {
 
 CLOSURES = ("spherical", "revolute", "fixed", "universal", "prismatic")
 """Kinds of joints that close a loop."""
+
+ROUND = np.pi / 6 * np.arange(12)
+"""Angles of the corners of what is round."""
 
 MOST_JOINTS, MOST_LINKS = 300, 3000
 """Joints that move, and links; the largest robots that were met have 78 and 150."""
@@ -107,6 +111,35 @@ class Coupling:
     line: int = 1
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """A solid for pictures: the corners (k, 3) of its hull, in the frame of a link."""
+
+    link: str
+    corners: Array
+
+    @classmethod
+    def of(cls, link: str, kind: str, sizes: Sequence[float], at: Array) -> Shape:
+        """Return a box, a sphere, a cylinder or a capsule about z.
+
+        Sizes are the halves of a box and of an ellipsoid; else the radius, and half the length of a
+        cylinder, or between the centres of the ends of a capsule.
+        """
+        if kind == "box":
+            points = np.array(list(product((-1.0, 1.0), repeat=3))) * sizes
+        else:
+            r, half = (1.0, 0.0) if kind == "ellipsoid" else (*sizes, 0.0)[:2]
+            balls = [(r * math.sin(x), r * math.cos(x)) for x in math.pi / 5 * np.arange(6)]
+            rings = [(a, z + math.copysign(half, z)) for a, z in balls]
+            rings = [(r, half), (r, -half)] if kind == "cylinder" else rings
+            points = np.array(
+                [(a * math.cos(x), a * math.sin(x), z) for a, z in rings for x in ROUND]
+            )
+            points = points * sizes if kind == "ellipsoid" else points
+        corners = points @ at[:3, :3].T + at[:3, 3]
+        return cls(link, np.unique(np.round(corners, 9) + 0.0, axis=0))
+
+
 @dataclass(slots=True, eq=False)
 class Robot:
     """A robot as its file says it."""
@@ -122,6 +155,8 @@ class Robot:
     passive: set[str] = field(default_factory=set)  # joints that are said to be no motors
     start: dict[str, tuple[float, ...]] = field(default_factory=dict)
     gravity: tuple[float, ...] = (0.0, 0.0, -9.81)
+    shapes: list[Shape] = field(default_factory=list)
+    meshes: list[str] = field(default_factory=list)  # names of files that are not read
 
     @property
     def parents(self) -> dict[str, Joint]:

@@ -88,7 +88,7 @@ class _Builder:
         """Return the mechanism."""
         made, robot = self._made, self._robot
         frames, *_ = self._tree.frames(self._x)
-        masses = self._masses()
+        masses, outlines = self._masses(), self._outlines()
         for link, name in self._names.items():
             if link in self._tips:
                 continue
@@ -96,7 +96,8 @@ class _Builder:
             p, _ = euler_parameters(place[:3, :3], None, None, {})
             mass = masses.get(link)
             heavy = {} if mass is None else _heavy(mass)
-            self._bodies[link] = made.body(name, _tidy(place[:3, 3]), p, **heavy)
+            outline = outlines.get(link, ())
+            self._bodies[link] = made.body(name, _tidy(place[:3, 3]), p, outline=outline, **heavy)
         for joint in robot.joints.values():
             if joint.freedoms:
                 made.add(self._joint(joint))
@@ -150,6 +151,18 @@ class _Builder:
                 self._robot.file, listed(impossible),
             )  # fmt: skip
         return {body: mass for body, mass in found.items() if body not in impossible}
+
+    def _outlines(self) -> dict[str, list[Any]]:
+        """Return the solids of bodies, for pictures; meshes are named, and not read."""
+        found: dict[str, list[Any]] = {}
+        for shape in self._robot.shapes:
+            body, place = self._host[shape.link]
+            corners = shape.corners @ place[:3, :3].T + place[:3, 3]
+            found.setdefault(body, []).append([_tidy(x) for x in np.round(corners, 9)])
+        if self._robot.meshes:
+            names = listed(list(dict.fromkeys(self._robot.meshes)), 5)
+            LOG.info("%s: meshes are not read: %s", self._robot.file, names)
+        return found
 
     def _joint(self, joint: Joint) -> Constraint:
         i, a = self._side(joint.parent, joint.at)

@@ -18,6 +18,7 @@ from kincompile.files.robots.robot import (
     Joint,
     Mass,
     Robot,
+    Shape,
     from_rpy,
     order_tree,
 )
@@ -60,6 +61,7 @@ class _UrdfReader(XmlReader):
             if (name := self.name(element)) in robot.links:
                 self.problem(element.line, f"there are two links {name!r}; rename one")
             robot.links[name] = self._mass(element.one("inertial"))
+            self._shapes(name, element)
         for element in root.all("joint"):
             self._joint(element)
         if not robot.links:
@@ -98,6 +100,21 @@ class _UrdfReader(XmlReader):
             return None
         own = Mass(mass, np.zeros(3), np.array([[a, b, c], [b, d, e], [c, e, f]]))
         return own.seen_from(self._origin(element.one("origin")))
+
+    def _shapes(self, link: str, element: Element) -> None:
+        """Read what is drawn of a link; meshes by name."""
+        for visual in element.all("visual"):
+            at, geometry = self._origin(visual.one("origin")), visual.one("geometry")
+            for item in () if geometry is None else geometry.children:
+                if item.tag == "mesh":
+                    self._robot.meshes.append(item.attributes.get("filename", ""))
+                    continue
+                sizes = [x / 2 for x in self.numbers(item, "size", (0.0,) * 3)]
+                if item.tag != "box":
+                    length = self.number(item, "length", 0.0)
+                    sizes = [self.number(item, "radius", 0.0), length / 2]
+                if item.tag in ("box", "cylinder", "sphere") and sizes[0] > 0:
+                    self._robot.shapes.append(Shape.of(link, item.tag, sizes, at))
 
     def _link(self, element: Element, *tags: str) -> str:
         """Return the link that a child with one of these tags names; "" with a problem."""

@@ -18,6 +18,8 @@ from kincompile.cli import cli
 from kincompile.files.robots.closing import Tree, led
 from kincompile.files.robots.urdf import read_urdf
 from kincompile.files.robots.xml_text import read_xml
+from kincompile.view.drawing import drawing
+from kincompile.view.marks import Hull, shape_of
 
 DATA = Path(__file__).parents[2] / "data" / "robots"
 SMALL, LARGE = ["5bar_linkage_iso3d", "welded_four_bar"], [
@@ -406,3 +408,68 @@ def test_mjcf_that_is_refused(tmp_path: Path) -> None:
     assert kc.read(path).bodies[0].mass == 2
     with pytest.raises(kc.InputError, match="loops are in <equality>"):
         kc.read(path, loops="a.yaml")
+
+
+SHAPES = (
+    '<visual><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/><geometry>'
+    '<box size="0.4 0.2 0.1"/></geometry></visual><visual><geometry>'
+    '<cylinder radius="0.05" length="0.3"/></geometry></visual><visual><geometry>'
+    '<sphere radius="0.02"/></geometry></visual><visual><geometry>'
+    '<mesh filename="package://arm.stl"/></geometry></visual>'
+)
+
+
+def assert_shapes(body: Any) -> None:
+    box, cylinder, ball = (np.array(x) for x in body.outline)
+    np.testing.assert_allclose(np.ptp(box, axis=0), [0.2, 0.4, 0.1], atol=1e-8)
+    np.testing.assert_allclose(box.mean(axis=0), [0.1, 0, 0], atol=1e-8)
+    np.testing.assert_allclose(np.hypot(*cylinder[:, :2].T), 0.05, atol=1e-8)
+    assert {*cylinder[:, 2]} == {-0.15, 0.15}
+    np.testing.assert_allclose(np.linalg.norm(ball, axis=1), 0.02, atol=1e-8)
+
+
+def test_that_shapes_of_links_are_drawn_and_meshes_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO")
+    text = TREE.format("continuous", "").replace(
+        '<link name="a"/>', f'<link name="a">{SHAPES}</link>'
+    )
+    m = model(tmp_path, text)
+    assert "meshes are not read: package://arm.stl" in caplog.text
+    (written := tmp_path / "robot.toml").write_text(m.to_toml())
+    for found in (m, kc.read(written)):
+        assert_shapes(found.bodies[0])
+        assert len(found.bodies[1].outline) == 0
+    drawn = drawing(m)
+    shells = [x for x in drawn.marks if isinstance(x, Hull) and x.style == "shell"]
+    assert [len(x.points) for x in shells] == [50, 24, 8]
+    assert "stub" in {shape_of(x) for x in drawn.marks}  # b, by its joint
+
+
+def test_that_shapes_of_mjcf_are_drawn_and_have_no_mass(tmp_path: Path) -> None:
+    geoms = (
+        '<geom type="box" pos="0.1 0 0" euler="0 0 90" size="0.2 0.1 0.05"/>'
+        '<geom type="cylinder" size="0.05 0.15" mass="7"/><geom size="0.02"/>'
+        '<geom type="mesh" mesh="arm"/>'
+    )
+    path = tmp_path / "robot.xml"
+    (tmp_path / "good.xml").write_text("<m/>")
+    path.write_text(MJCF.format("good.xml", "0 0 1", geoms))
+    (body,) = kc.read(path).bodies
+    assert_shapes(body)
+    assert body.mass == 2
+
+
+def test_that_outlines_in_space_are_checked() -> None:
+    m = spatial.Mechanism("m")
+    corners = [(0, 0, 0), (1, 0, 0), (0, 1)]
+    m.add(spatial.Spherical("A", m.ground, (0, 0, 0), m.body("a", outline=[corners]), (0, 0, 0)))
+    with pytest.raises(
+        kc.ModelError, match=r"outline of a, solid 1: it has 3 corners; a solid has 4"
+    ):
+        m.system()
+    with pytest.raises(
+        kc.ModelError, match=r"corner 3, \(0, 1\), is not \(xi, eta, zeta\); give three"
+    ):
+        m.system()
