@@ -1,11 +1,11 @@
-"""`python -m docs.builders WHAT [FOLDER]`: write pictures, pages, notebooks or the course kit."""
+"""`python -m docs.builders WHAT [FOLDER]`: write pictures, pages, short lines or the course kit."""
 
 from __future__ import annotations
 
 import sys
 
-from docs.builders import course, fields, joints, lessons, notebooks, pictures
-from docs.builders.places import DOCS, write
+from docs.builders import course, fields, joints, lessons, notebooks, pictures, wrap
+from docs.builders.places import DOCS, ROOT, write
 
 WRITERS = {
     "pictures": lambda: write(
@@ -14,6 +14,9 @@ WRITERS = {
     "joints": lambda: write(DOCS, {"joints.md": joints.page()}),
     "fields": lambda: write(DOCS, {fields.PAGE: fields.page()}),
     "notebooks": lambda: write(notebooks.FOLDER, notebooks.notebooks()),
+    "wrap": lambda: write(
+        ROOT, {str(path): wrap.wrapped(path.read_text("utf-8")) for path in wrap.pages()}
+    ),
     "course": lambda: course.make(sys.argv[2:]),
 }
 

@@ -27,7 +27,7 @@ THUMBNAILS = (
     "wrecker_boom", "jansen", "four_bar", "shaper", "klann", "double_wishbone", "gear_train",
     "cam_flat_follower", "rack_and_pinion",
 )  # fmt: skip
-"""The examples that the README shows; the first is its large picture."""
+"""The examples that the README and examples/README.md show; the first is the large picture."""
 
 STILL = ("double_wishbone_with_steering", "delta_robot", "stewart_gough")
 """Those in space: a picture of solids at 48 times would take megabytes."""

@@ -219,7 +219,8 @@ def test_that_a_program_that_is_missing_is_named():
 
 
 def test_that_the_readme_is_short():
-    assert len(README.splitlines()) <= 180
+    assert len(README.splitlines()) <= 170
+    assert README.index("make test") < README.index("<img") < README.index("## ")
 
 
 def test_that_an_extra_is_installed_without_a_copy_of_the_package():

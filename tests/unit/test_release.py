@@ -31,6 +31,7 @@ def test_that_there_is_one_version():
 def test_that_the_changelog_has_a_section_on_generated_code():
     unreleased, newest = re.split(r"^## ", text("CHANGELOG.md"), flags=re.MULTILINE)[1:3]
     assert unreleased.startswith("Unreleased\n")
+    assert len(unreleased.splitlines()) < 100, "a release is by feature"
     assert newest.startswith(kc.__version__)
     assert "\n### Generated code\n" in newest
 
