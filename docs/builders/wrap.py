@@ -52,7 +52,7 @@ def _blocks(lines: list[str]) -> Iterator[tuple[list[str], bool]]:
     closing = "---" if lines[0] == "---" else ""
     for number, line in enumerate(lines):
         fence = FENCE.match(line)
-        kept = closing or fence or not line.strip() or KEPT.match(line)
+        kept = bool(closing or fence or not line.strip() or KEPT.match(line))
         if closing and number > 0 and line.rstrip().endswith(closing):
             closing = ""
         elif fence and not closing:
