@@ -72,7 +72,7 @@ $(NODE_READY): $(TEST_READY) .ci/page/package-lock.json
 
 $(PAGES_READY): $(NODE_READY)
 	@echo "Installing what reads notebooks, drives a browser and grades courses into $(VENV)"
-	@$(PIP) --editable '.[pages,courses]'
+	@$(PIP) --editable '.[pages,courses,oracles]'
 	@touch $@
 
 $(LINT_READY): $(NODE_READY)

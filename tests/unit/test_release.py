@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
     "optional-dependencies"
 ]
-FOR_DEVELOPERS = {"test", "pages", "docs", "bench", "lint", "release"}
+FOR_DEVELOPERS = {"test", "pages", "oracles", "docs", "bench", "lint", "release"}
 
 
 def text(path: str) -> str:
