@@ -17,9 +17,10 @@ from typing import Any
 from kincompile.names import suggestion
 
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-_HOME = {
-    name: module for module, name in re.findall(r"^from (\S+) import (\w+) as", _STUB, re.MULTILINE)
-}
+_LINES = re.findall(r"^from (\S+) import (\w+) as \w+(?: +# (.*))?$", _STUB, re.MULTILINE)
+_HOME = {name: module for module, name, _ in _LINES}
+_LATER = {name for module, name, kind in _LINES if "result" in kind or module.endswith(".errors")}
+"""What no one types first: what calls return, errors and warnings."""
 _CATALOGUE = "kincompile.model.catalogue"
 _FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "log", "sqrt")
 _WITHOUT_SYMPY = ("kincompile.runtime", "kincompile.errors")
@@ -58,4 +59,4 @@ def _constraint_types() -> tuple[str, ...]:
 
 
 def __dir__() -> list[str]:
-    return [*__getattr__("__all__"), "__version__"]
+    return [*sorted({*__getattr__("__all__")} - _LATER), "__version__"]

@@ -1,23 +1,24 @@
 """The public names and where each is defined: for type checkers, and for `__init__.py`.
 
 `__init__.py` reads the lines below and loads a name when it is first used. The types of constraints
-are those of the catalogue.
+are those of the catalogue. A name is stable unless its line says `provisional`; a `result` is
+returned by calls, and `dir` leaves it out with the errors and warnings. docs/api.md shows all.
 """
 
 from kincompile.checker.compare import compare as compare
 from kincompile.checker.compare import compare_file as compare_file
-from kincompile.classical import linkages as linkages
-from kincompile.classical import synthesis as synthesis
+from kincompile.classical import linkages as linkages  # provisional
+from kincompile.classical import synthesis as synthesis  # provisional
 from kincompile.compiler import compile as compile  # noqa: A004
 from kincompile.compiler import emit as emit
 from kincompile.compiler import inspect as inspect
 from kincompile.derivations.derivation import derivation as derivation
-from kincompile.design import targets as targets
+from kincompile.design import targets as targets  # provisional
 from kincompile.design.deviation import Deviation as Deviation
-from kincompile.design.fit import fit as fit
-from kincompile.design.fitted import Fit as Fit
+from kincompile.design.fit import fit as fit  # provisional
+from kincompile.design.fitted import Fit as Fit  # result, provisional
 from kincompile.design.tolerance import tolerance as tolerance
-from kincompile.design.tolerance_analysis import ToleranceAnalysis as ToleranceAnalysis
+from kincompile.design.tolerance_analysis import ToleranceAnalysis as ToleranceAnalysis  # result
 from kincompile.errors import AssemblyWarning as AssemblyWarning
 from kincompile.errors import BranchSwitchWarning as BranchSwitchWarning
 from kincompile.errors import ContractError as ContractError
@@ -40,10 +41,10 @@ from kincompile.files.file_format import model_schema as model_schema
 from kincompile.files.files import read as read
 from kincompile.files.files import read_analysis as read_analysis
 from kincompile.files.files import read_model as read_model
-from kincompile.functions.differentiable import jax as jax
-from kincompile.functions.poses import Poses as Poses
-from kincompile.functions.transmission import Transmission as Transmission
-from kincompile.functions.transmission import transmission as transmission
+from kincompile.functions.differentiable import jax as jax  # provisional
+from kincompile.functions.poses import Poses as Poses  # result, provisional
+from kincompile.functions.transmission import Transmission as Transmission  # result, provisional
+from kincompile.functions.transmission import transmission as transmission  # provisional
 from kincompile.model import motion as motion
 from kincompile.model import outputs as outputs
 from kincompile.model.catalogue import *
@@ -65,32 +66,32 @@ from kincompile.model.system import ConstraintSystem as ConstraintSystem
 from kincompile.runtime.dynamics.simulate import simulate as simulate
 from kincompile.runtime.load import load as load
 from kincompile.runtime.newton import newton as newton
-from kincompile.runtime.results.forces import Forces as Forces
+from kincompile.runtime.results.forces import Forces as Forces  # result
 from kincompile.runtime.results.forces import forces as forces
-from kincompile.runtime.results.sensitivities import Sensitivities as Sensitivities
+from kincompile.runtime.results.sensitivities import Sensitivities as Sensitivities  # result
 from kincompile.runtime.results.sensitivities import sensitivities as sensitivities
-from kincompile.runtime.results.solution import Solution as Solution
+from kincompile.runtime.results.solution import Solution as Solution  # result
 from kincompile.runtime.results.write import write as write
 from kincompile.runtime.singular.assemblies import assemblies as assemblies
-from kincompile.runtime.singular.events import Event as Event
+from kincompile.runtime.singular.events import Event as Event  # result
 from kincompile.runtime.solve import solve as solve
-from kincompile.runtime.statics.equilibrium import Equilibrium as Equilibrium
-from kincompile.runtime.statics.equilibrium import equilibria as equilibria
+from kincompile.runtime.statics.equilibrium import Equilibrium as Equilibrium  # result
+from kincompile.runtime.statics.equilibrium import equilibria as equilibria  # provisional
 from kincompile.runtime.statics.equilibrium import equilibrium as equilibrium
-from kincompile.runtime.statics.flywheel import Flywheel as Flywheel
-from kincompile.runtime.statics.flywheel import flywheel as flywheel
-from kincompile.runtime.status import Status as Status
-from kincompile.runtime.stepper import Instant as Instant
-from kincompile.runtime.stepper import Stepper as Stepper
-from kincompile.runtime.stepper import stepper as stepper
+from kincompile.runtime.statics.flywheel import Flywheel as Flywheel  # result, provisional
+from kincompile.runtime.statics.flywheel import flywheel as flywheel  # provisional
+from kincompile.runtime.status import Status as Status  # result
+from kincompile.runtime.stepper import Instant as Instant  # result, provisional
+from kincompile.runtime.stepper import Stepper as Stepper  # result, provisional
+from kincompile.runtime.stepper import stepper as stepper  # provisional
 from kincompile.runtime.times import times_at as times_at
-from kincompile.sweeps.result import Sweep as Sweep
-from kincompile.sweeps.sweep import sweep as sweep
+from kincompile.sweeps.result import Sweep as Sweep  # result, provisional
+from kincompile.sweeps.sweep import sweep as sweep  # provisional
 from kincompile.verification.verify import verify as verify
 from kincompile.view.animation import animate as animate
 from kincompile.view.draw import draw as draw
-from kincompile.view.editor import editor as editor
-from kincompile.view.gallery import assembly_gallery as assembly_gallery
+from kincompile.view.editor import editor as editor  # provisional
+from kincompile.view.gallery import assembly_gallery as assembly_gallery  # provisional
 from kincompile.view.gallery import gallery as gallery
 from kincompile.view.mechanism_plot import plot_mechanism as plot_mechanism
 from kincompile.view.page import page as page

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from docs.builders import course, fields, joints, lessons, notebooks, pictures, wrap
+from docs.builders import api, course, fields, joints, lessons, notebooks, pictures, wrap
 from docs.builders.places import DOCS, ROOT, write
 
 WRITERS = {
@@ -12,6 +12,7 @@ WRITERS = {
         DOCS / "images", {**joints.pictures(), **lessons.sketches(), **pictures.drawn()}
     ),
     "joints": lambda: write(DOCS, {"joints.md": joints.page()}),
+    "api": lambda: write(DOCS, {api.PAGE: api.page()}),
     "fields": lambda: write(DOCS, {fields.PAGE: fields.page()}),
     "notebooks": lambda: write(notebooks.FOLDER, notebooks.notebooks()),
     "wrap": lambda: write(

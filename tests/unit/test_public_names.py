@@ -1,5 +1,6 @@
 """The public names of the package, whatever is imported first."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -7,7 +8,10 @@ from pathlib import Path
 import pytest
 
 import kincompile as kc
+from docs.builders import api
+from docs.builders.places import DOCS
 from kincompile.model.catalogue import CONSTRAINTS
+from kincompile.space.catalogue import CONSTRAINTS as IN_SPACE
 
 
 @pytest.mark.parametrize(
@@ -28,9 +32,27 @@ def test_that_type_checkers_see_the_constraint_types_of_the_catalogue() -> None:
 
 
 def test_that_all_public_names_are_listed_and_can_be_had() -> None:
-    assert set(kc.__dir__()) == {*kc.__all__, "__version__"}
+    assert set(kc.__dir__()) < {*kc.__all__, "__version__"}
     assert set(CONSTRAINTS) < set(kc.__all__)
     assert all(hasattr(kc, name) for name in kc.__all__)
+
+
+def test_that_completion_shows_what_is_typed_and_not_what_calls_return() -> None:
+    shown = set(dir(kc))
+    assert {"Mechanism", "Sketch", "Revolute", "compile", "solve", "inspect", "page", "t"} <= shown
+    hidden = set(kc.__all__) - shown
+    assert {"Solution", "InputError", "AssemblyWarning", "Fit"} <= hidden
+    assert all(isinstance(getattr(kc, name), type) for name in hidden)
+    assert not any(name.endswith(("Error", "Warning")) for name in shown)
+
+
+def test_that_the_page_of_stability_follows_from_the_names() -> None:
+    page = (DOCS / "api.md").read_text(encoding="utf-8")
+    assert page == api.page(), "python -m docs.builders api writes it anew"
+    rows = re.findall(r"^\| `(\w+)` \| (.+) \| (stable|provisional) \|$", page, re.MULTILINE)
+    plane, _, space = page.partition("## In space")
+    assert {name for name, _, _ in rows if f"| `{name}` |" in plane} == set(kc.__all__)
+    assert all(f"| `{name}` |" in space for name in IN_SPACE)
 
 
 @pytest.mark.parametrize("wrong", ["Revolut", "solv", "Mechansim"])
@@ -67,10 +89,10 @@ def test_that_names_of_the_runtime_do_not_load_sympy(name: str) -> None:
     assert result.stdout.strip() == "False"
 
 
-def test_that_no_folder_hides_a_public_name() -> None:
-    folders = {item.name for item in Path(str(kc.__file__)).parent.iterdir() if item.is_dir()}
-    assert len(folders) > 10
-    assert folders.isdisjoint(dir(kc))
+def test_that_no_folder_and_no_module_hides_a_public_name() -> None:
+    files = {item.stem for item in Path(str(kc.__file__)).parent.iterdir()} - {"__init__"}
+    assert len(files) > 30
+    assert files.isdisjoint(kc.__all__)
 
 
 def test_that_modules_are_imported_by_their_whole_names() -> None:
