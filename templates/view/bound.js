@@ -111,12 +111,14 @@ export class Bound {
       if (Object.values(functions).some(jet => jet(0.1)[1] || jet(0.37)[1])) drives.add(this.instances[k].row);
     });
     this.factors = null;
+    // Until it is known which equations repeat others, as many as are too many are left out of rates.
+    this.REDUNDANT = this.EQUATIONS.slice(n);
     const ordered = [...Array(this.N_EQUATIONS).keys()].sort((a, b) => Number(drives.has(a)) - Number(drives.has(b)) || a - b);
     const start = this.assembledAt(0, this.GUESS);
-    const states = [start, ...GENERIC_TIMES.map((part, k) => {
-      const stirred = start.q.map((x, i) => x + STIR * (k + 1) * this.PROBE[i] * (this.ANGULAR[i] ? 1 : start.size));
-      return this.assembledAt(part * this.end, k ? stirred : start.q);
-    })].filter(state => state.isFound);
+    const stirred = part => start.q.map((x, i) => x + STIR * part * this.PROBE[i] * (this.ANGULAR[i] ? 1 : start.size));
+    const states = [start, ...GENERIC_TIMES.map((part, k) => this.assembledAt(part * this.end, stirred(k)))].filter(state => state.isFound);
+    // One position alone may be singular: then links of other lengths say what is redundant.
+    if (states.length < 2) states.push({ ...start, q: stirred(1) });
     const ranks = states.map(state => this.rankAt(state, ordered));
     const best = ranks.reduce((most, found) => (found && found.kept.length > (most?.kept.length ?? -1) ? found : most), null) ?? this.rankAt(start, ordered);
     Object.assign(this, { start, rank: best.kept.length, free: best.free, isAssembled: start.isFound });

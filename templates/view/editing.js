@@ -156,10 +156,10 @@ export class Editing {
     const n = bound.N_COORDINATES, drives = model.constraints.filter(item => isDriver(item));
     const driven = drives.length, joints = bound.N_EQUATIONS - driven, degrees = n - bound.rank;
     const lines = [
-      `${n} coordinates, ${joints} joint equations: ${n - joints} degrees of freedom by Gruebler's count, ${driven} driver equations.`,
+      `${n} coordinates, ${joints} joint equations: ${counted(n - joints, 'degree')} of freedom by Gruebler's count, ${counted(driven, 'driver equation')}.`,
       `Rank ${bound.rank} at generic ${bound.isAssembled ? 'assembled ' : ''}states: ${degrees ? `${counted(degrees, 'degree')} of freedom left to ${this.owners(bound.free)}` : 'nothing may move by itself'}.`,
     ];
-    if (bound.REDUNDANT.length) lines.push(`Redundant: ${bound.REDUNDANT.join(', ')}.`);
+    if (bound.REDUNDANT.length) lines.push(`Redundant${bound.isAssembled ? '' : ' or conflicting'}: ${bound.REDUNDANT.join(', ')}.`);
     if (!bound.isAssembled) lines.push('It cannot be assembled at t = 0, or not from this drawing. Change the lengths or the drivers so that the links reach each other.');
     else if (bound.rankAtStart < bound.rank) lines.push('Singular at t = 0, a dead point or a change point: velocities are not determined there. Let the drivers start from another position, or drive another body.');
     if (degrees && bound.isAssembled) lines.push(`It moves as soon as ${counted(degrees, 'driver')} ${degrees > 1 ? 'are' : 'is'} there: press Driver, then a link.`);

@@ -273,7 +273,7 @@ function rowOf(kind, name, owner, keys, remove = null) {
 }
 
 function boxOfValue(kind, name, owner, key) {
-  const box = made('input'), label = made('label', key === name ? 'at ' : `${key} `);
+  const box = made('input'), label = made('label', key !== name ? `${key} ` : kind === 'length' ? 'value ' : 'at ');
   box.value = owner[key] === undefined ? '' : textOf(owner[key]);
   box.ariaLabel = `${key} of ${kind} ${name}`;
   box.onchange = () => editor.change(() => {
@@ -379,7 +379,11 @@ function onBoard(event) {
     }
     editor.draw();
   } else if (key === 'Escape') {
-    if (board.held) undo('undo');
+    const { held } = board;
+    if (held) {
+      undo('undo');
+      board.cursor = board.jointPlaces().get(held);
+    }
     board.first = board.held = null;
     editor.isOpen = false;
     editor.draw();
@@ -501,7 +505,8 @@ function start() {
   }).observe(part('canvas').parentElement);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', acts.theme);
   if (given.file) openText(given.file);
-  editor.take('link');
+  editing.past = [];
+  editor.take(given.file ? 'move' : 'link');
   editor.show();
 }
 

@@ -73,6 +73,11 @@ def exam(folder: Path) -> Path:
     return Path(kit, "students/sheets.html")
 
 
+def editor(folder: Path) -> Path:
+    """Write the editor with a mechanism in it."""
+    return kc.editor(ROOT / "examples" / "klann.toml").write(folder / "editor.html")
+
+
 def feedback(folder: Path) -> Path:
     """Write what a student is answered: one entry is wrong, one is not read, others are missing."""
     kit = kc.exercise(crank(), 1, 1).write(folder / "handed_in")
@@ -84,6 +89,7 @@ REPORTS: dict[str, Callable[[Path], Path]] = {
     "derivation": lambda folder: derivation(folder, "crank.html"),
     "slides": lambda folder: derivation(folder, "crank.slides.html"),
     "sweep": sweep, "fit": fit, "sheet": sheet, "exam": exam, "feedback": feedback,
+    "editor": editor,
 }  # fmt: skip
 
 

@@ -208,6 +208,64 @@ def test_that_what_is_drawn_and_saved_moves_as_kincompile_solves_it(tmp_path):
         require_equal(item, own_solution(names["m"]), f"{name} as Python")
 
 
+# ---- what is found -----------------------------------------------------------------------------
+
+A_SKETCH = """kincompile = 1
+name = "m"
+[sketch]
+ground = {{ A = [0, 0], D = [2, 0], F = [1, 0] }}
+joints = {{ B = [0, 1], C = {C}, E = [1, 1] }}
+parts = [
+    {{ link = "a", joints = "A B" }},
+    {{ link = "b", joints = "B C E" }},
+    {{ link = "c", joints = "D C" }},
+    {more}
+]
+"""
+DRIVE, THIRD = '{ drive = "a", value = "pi/2 + t" },', '{ link = "d", joints = "F E" },'
+STRETCHED = A_SKETCH.format(C="[2, 1]", more=DRIVE).replace("B = [0, 1]", "B = [0.5, 0]")
+FOUND = {
+    "a four-bar": A_SKETCH.format(C="[2, 1.5]", more=DRIVE),
+    "without a driver": A_SKETCH.format(C="[2, 1.5]", more=""),
+    "a third crank": A_SKETCH.format(C="[2, 1]", more=THIRD + DRIVE),
+    "a truss at a change point": A_SKETCH.format(C="[2, 1]", more=THIRD),
+    "two drivers": A_SKETCH.format(C="[2, 1.5]", more=f'{DRIVE}{{ drive = "c", value = "pi/2" }}'),
+    "stretched": STRETCHED.replace("C = [2, 1]", "C = [1.2, 0]").replace('"pi/2 + t"', '"t"'),
+}
+
+
+@pytest.mark.slow
+def test_that_redundant_joints_move_as_kincompile_solves_them(tmp_path):
+    path = tmp_path / "m.toml"
+    path.write_text(FOUND["a third crank"], encoding="utf-8")
+    found = run("tell(solved(given));", FOUND["a third crank"])
+    require_equal(found, own_solution(kc.read(path)), "a third crank")
+
+
+def test_that_counts_and_ranks_are_those_of_inspect(tmp_path):
+    found = run(
+        """tell(given.map(text => {
+  const editing = new Editing();
+  editing.openText(text);
+  const { rank, REDUNDANT, rankAtStart, free } = editing.bound;
+  return [rank, REDUNDANT, rankAtStart, editing.owners(free), editing.findings().lines];
+}));""",
+        list(FOUND.values()),
+    )
+    for (name, text), item in zip(FOUND.items(), found, strict=True):
+        path = tmp_path / "model.toml"
+        path.write_text(text, encoding="utf-8")
+        wanted = kc.inspect(kc.read(path))
+        rank, redundant, rank_at_start, free, lines = item
+        assert rank == wanted.rank, name
+        assert redundant == [*wanted.redundant, *wanted.conflicting], name
+        assert free == ", ".join(wanted.free), name
+        assert f"{wanted.mobility.coordinates} coordinates" in lines[0]
+        if name != "two drivers":  # inspect leaves the conflict out, and looks at the rest
+            assert rank_at_start == wanted.rank_at_start, name
+            assert any("Singular at t = 0" in x for x in lines) == (rank_at_start < rank), name
+
+
 # ---- parts -------------------------------------------------------------------------------------
 
 
