@@ -75,7 +75,7 @@ def exam(folder: Path) -> Path:
 
 def editor(folder: Path) -> Path:
     """Write the editor with a mechanism in it."""
-    return kc.editor(ROOT / "examples" / "klann.toml").write(folder / "editor.html")
+    return Path(kc.editor(ROOT / "examples/klann.toml").write(folder / "editor.html"))
 
 
 def feedback(folder: Path) -> Path:
