@@ -9,9 +9,8 @@ import pytest
 import kincompile as kc
 
 ROOT = Path(__file__).resolve().parents[2]
-EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
-    "optional-dependencies"
-]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+EXTRAS = PROJECT["optional-dependencies"]
 FOR_DEVELOPERS = {"test", "pages", "oracles", "docs", "bench", "lint", "release"}
 
 
@@ -26,6 +25,14 @@ def test_that_there_is_one_version():
     assert 'version = { attr = "kincompile.__version__" }' in text("pyproject.toml")
     released = re.findall(r"^## \[?(\d+\.\d+\.\d+)", text("CHANGELOG.md"), re.MULTILINE)
     assert released[:1] == [kc.__version__]
+
+
+def test_that_the_conda_recipe_has_the_version_and_the_dependencies():
+    recipe = text("conda.recipe/recipe.yaml")
+    assert f'version: "{kc.__version__}"' in recipe
+    needed = recipe[recipe.index("  run:") : recipe.index("tests:")]
+    listed = re.findall(r"^    - (\w+) (\S+)$", needed, re.MULTILINE)
+    assert [name + bounds for name, bounds in listed if name != "python"] == PROJECT["dependencies"]
 
 
 def test_that_the_changelog_has_a_section_on_generated_code():
@@ -82,3 +89,30 @@ def test_that_the_paper_has_the_length_and_the_parts_that_its_journal_asks_for()
     assert 750 <= len(body.split()) <= 1750
     parts = re.findall(r"^# (.*)$", body, re.MULTILINE)
     assert {"Summary", "Statement of need", "State of the field", "References"} <= set(parts)
+
+
+def test_that_the_comparison_has_the_numbers_of_the_benchmarks():
+    columns = ("kincompile, C", "kincompile, NumPy", "CasADi fast_newton in mapaccum, generated C")
+    columns += ("pylinkage dyads, Numba (joints only)",)
+    measured, page = text("benchmarks/README.md"), text("docs/comparison.md")
+    for title in ("four-bar", "six-bar", "RSSR linkage", "double wishbone"):
+        (row,) = re.findall(rf"^\| {title} \|(( [\d.]* ?\|)+)$", page, re.MULTILINE)
+        part = title.removesuffix(" linkage").lower().replace("-", "_").replace(" ", "_")
+        table = measured.split(f"#### {part}, 10000 points")[1].split("\n\n")[1]
+        found = dict(re.findall(r"^\| \**(.+?)\** \| .* \| (\S+) \|$", table, re.MULTILINE))
+        for column, cell in zip(columns, row[0].split("|"), strict=False):
+            decimals = len(cell.strip().partition(".")[2])
+            if cell.strip():
+                assert abs(float(found[column]) - float(cell)) <= 0.5001 * 10**-decimals
+
+
+def test_that_times_in_words_are_those_of_the_benchmarks():
+    measured = text("benchmarks/README.md")
+    table = measured.split("#### four_bar, 10000 points")[1].split("\n\n")[1]
+    times = {float(f"{float(x):.2g}") for x in re.findall(r"\| ([\d.e+]+) \(", table)}
+    (row,) = re.findall(r"^\|(( \d[\d.]* ms \|)+)$", text("README.md"), re.MULTILINE)
+    shown = {float(x) for x in re.findall(r"[\d.]+", row[0])}
+    assert len(shown) == 6
+    assert shown <= times
+    assert "takes 1.4 ms in C\nand 5.9 ms in NumPy" in text("paper/paper.md")
+    assert {1.4, 5.9} <= times
