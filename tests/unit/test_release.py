@@ -92,8 +92,12 @@ def test_that_the_paper_has_the_length_and_the_parts_that_its_journal_asks_for()
 
 
 def test_that_the_comparison_has_the_numbers_of_the_benchmarks():
-    columns = ("kincompile, C", "kincompile, NumPy", "CasADi fast_newton in mapaccum, generated C")
-    columns += ("pylinkage dyads, Numba (joints only)",)
+    columns = (
+        "kincompile, C",
+        "kincompile, NumPy",
+        "CasADi fast_newton in mapaccum, generated C",
+        "pylinkage dyads, Numba (joints only)",
+    )
     measured, page = text("benchmarks/README.md"), text("docs/comparison.md")
     for title in ("four-bar", "six-bar", "RSSR linkage", "double wishbone"):
         (row,) = re.findall(rf"^\| {title} \|(( [\d.]* ?\|)+)$", page, re.MULTILINE)
