@@ -1857,11 +1857,12 @@ static void solve_of_strip(double (*restrict Phi_q)[LANES], double (*restrict F)
 
 // Copy numbers of `count` points, from point `start` on, into rows; what is not finite shows in
 // `check`, which stays 0 otherwise.
-static void read_rows(double (*rows)[LANES], size_t size, spatial_slider_crank_input from, size_t start,
-    size_t count, double *check)
+static void read_rows(double (*restrict rows)[LANES], size_t size, spatial_slider_crank_input from,
+    size_t start, size_t count, double *restrict check)
 {
     for (size_t i = 0; i < size; i++) {
-        const double *first = from.first + (ptrdiff_t)i * from.entry + (ptrdiff_t)start * from.point;
+        const double *restrict first =
+            from.first + (ptrdiff_t)i * from.entry + (ptrdiff_t)start * from.point;
         if (from.point == 1 && count == LANES)
             memcpy(rows[i], first, LANES * sizeof *first);
         else
@@ -1903,12 +1904,12 @@ _always_inline void copy(double *to, const double *from, size_t size, int is_far
 }
 
 // Copy rows to where they are wanted: all of them, or those listed.
-static void store_rows(spatial_slider_crank_output to, double (*rows)[LANES], const int *listed, int size,
-    size_t start, size_t count, int is_far)
+static inline void store_rows(spatial_slider_crank_output to, double (*restrict rows)[LANES], const int *listed,
+    int size, size_t start, size_t count, int is_far)
 {
     if (to.first == NULL)
         return;
-    double *first = to.first + (ptrdiff_t)start * to.point;
+    double *restrict first = to.first + (ptrdiff_t)start * to.point;
     for (int n = 0; to.point == 1 && count == LANES && n < size; n++) {
         const int i = listed ? listed[n] : n;
         copy(first + i * to.entry, rows[i], LANES, is_far);
@@ -2059,8 +2060,9 @@ static void place_constants(strip *b, double *matrices, size_t count)
         }
 }
 
-// Write a quantity of a strip of points: as vectors or nonzeros, and as whole matrices.
-static void write_quantity(const spatial_slider_crank_batch *batch, const quantity *q, strip *b,
+// Write a quantity of a strip of points: as vectors or nonzeros, and as whole matrices. It is called
+// once a quantity, so that a compiler knows the sizes.
+_always_inline void write_quantity(const spatial_slider_crank_batch *batch, const quantity *q, strip *b,
     double *matrices, size_t start, size_t count, int is_far)
 {
     const spatial_slider_crank_output whole = output_of(batch, q->result);
@@ -2106,9 +2108,30 @@ int spatial_slider_crank_evaluate(const spatial_slider_crank_batch *batch)
         if (wants_second)
             read_rows(b.q_ddot, N, batch->q_ddot, start, count, check);
         run_kernels(wanted, &b, count);
-        for (int k = 0; k < QUANTITIES; k++)
-            if (wanted & 1u << k)
-                write_quantity(batch, &QUANTITY[k], &b, matrices, start, count, is_far);
+        if (wanted & 1)
+            write_quantity(batch, &QUANTITY[0], &b, matrices, start, count,
+                is_far);
+        if (wanted & 2)
+            write_quantity(batch, &QUANTITY[1], &b, matrices, start, count,
+                is_far);
+        if (wanted & 4)
+            write_quantity(batch, &QUANTITY[2], &b, matrices, start, count,
+                is_far);
+        if (wanted & 8)
+            write_quantity(batch, &QUANTITY[3], &b, matrices, start, count,
+                is_far);
+        if (wanted & 16)
+            write_quantity(batch, &QUANTITY[4], &b, matrices, start, count,
+                is_far);
+        if (wanted & 32)
+            write_quantity(batch, &QUANTITY[5], &b, matrices, start, count,
+                is_far);
+        if (wanted & 64)
+            write_quantity(batch, &QUANTITY[6], &b, matrices, start, count,
+                is_far);
+        if (wanted & 128)
+            write_quantity(batch, &QUANTITY[7], &b, matrices, start, count,
+                is_far);
     }
 #ifdef __x86_64__
     if (is_far)

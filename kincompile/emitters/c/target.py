@@ -189,6 +189,15 @@ def _batch(code: InlineProgram) -> dict[str, Any]:
     return {
         "quantities": indented(rows),
         "n_quantities": len(bits),
+        "writes": indented(
+            line
+            for k, bit in enumerate(bits.values())
+            for line in (
+                f"    if (wanted & {bit})",
+                f"        write_quantity(batch, &QUANTITY[{k}], &b, matrices, start, count,",
+                "            is_far);",
+            )
+        ),
         "matrices": max(matrices, 1),
         "reads_angles": sum(bits[x] for x, own in found.items() if own and own <= shared),
         "kinematics": indented([kernels.pop("kinematics")]),
