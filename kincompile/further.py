@@ -63,6 +63,8 @@ def makers_of(
         kinds.FOUR_BARS: partial(_four_bars, system),
         kinds.JOINTS: partial(_joints, system),
     }
+    if system.limits:
+        makers[kinds.LIMITS] = partial(_limits, system)
     if len(system.coordinates) <= LARGEST_REDUNDANT:
         makers[kinds.UNDRIVEN] = partial(_undriven, system)
     if not isinstance(code, InlineProgram):  # that of a large mechanism is not worth its memory
@@ -90,6 +92,20 @@ def _stepper(module: ModuleType, program: Program) -> Callable[..., Any]:
 def _joints(system: ConstraintSystem) -> dict[str, tuple[str, ...]]:
     """Return the bodies of each constraint, by its name."""
     return {item.name: tuple(body.name for body in item.bodies) for item in system.constraints}
+
+
+def _limits(system: ConstraintSystem) -> Callable[..., Any]:
+    """Return what says which limits of joints are left."""
+    from kincompile.space.limits import limits_left
+
+    names = [item.name for item in system.parameters]
+    columns = dict(zip((body.name for body in system.bodies), system.body_columns, strict=True))
+
+    def left(q: NDArray[np.float64], t: NDArray[np.float64], p: NDArray[np.float64]) -> list[str]:
+        values = dict(zip(names, p.tolist(), strict=True))
+        return [*limits_left(system.limits, columns, q, t, values)]
+
+    return left
 
 
 def _four_bars(system: ConstraintSystem) -> Callable[..., Any]:

@@ -63,6 +63,8 @@ class Mechanism(MatrixViews, TextViews):
         Of a drawing the places of joints by name, in the frame of each body by its name.
     links
         Of a robot's file the body of each link by its name there, and its placement (4, 4) on it.
+    limits
+        Of a robot's file the limits of its joints.
     """
 
     fixed: ClassVar[Body] = GROUND
@@ -92,6 +94,7 @@ class Mechanism(MatrixViews, TextViews):
         self.tasks: Mapping[str, Any] = {}
         self.drawn: dict[str, Mapping[str, Point]] = {}
         self.links: Mapping[str, tuple[str, Any]] = {}
+        self.limits: Sequence[Any] = ()
 
     @property
     def end(self) -> float:
@@ -272,6 +275,7 @@ class Mechanism(MatrixViews, TextViews):
             points=self.points,
             tasks=self.tasks,
             links=self.links,
+            limits=self.limits,
         )
 
     @property

@@ -79,7 +79,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         Springs, forces and the like.
     ground
         The fixed frame of the bodies.
-    gravity, length_unit, mass_unit, end, points, tasks, links
+    gravity, length_unit, mass_unit, end, points, tasks, links, limits
         As for `Mechanism`.
 
     Attributes
@@ -110,8 +110,8 @@ class ConstraintSystem(MatrixViews, TextViews):
 
     __slots__ = (
         "bodies", "body_points", "constraints", "coordinates", "end", "end_given", "equations",
-        "gravity", "ground", "length_unit", "links", "loads", "mass_unit", "name", "observers",
-        "parameters", "points", "tasks",
+        "gravity", "ground", "length_unit", "limits", "links", "loads", "mass_unit", "name",
+        "observers", "parameters", "points", "tasks",
     )  # fmt: skip
 
     name: str
@@ -131,6 +131,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     end_given: Scalar
     points: int
     tasks: Mapping[str, Any]
+    limits: Sequence[Any]
     links: Mapping[str, tuple[str, Any]]
 
     def __init__(
@@ -152,6 +153,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         points: int = 101,
         tasks: Mapping[str, Any] | None = None,
         links: Mapping[str, tuple[str, Any]] | None = None,
+        limits: Sequence[Any] = (),
     ) -> None:
         problems: list[str] = []
         bodies = checked_bodies(bodies, problems)
@@ -189,7 +191,7 @@ class ConstraintSystem(MatrixViews, TextViews):
             "constraints": constraints, "equations": names, "body_points": body_points,
             "observers": observers, "loads": applied, "gravity": gravity, "ground": ground,
             "length_unit": length_unit, "mass_unit": mass_unit, "end": last, "end_given": end,
-            "points": points, "tasks": tasks or {}, "links": links or {},
+            "points": points, "tasks": tasks or {}, "links": links or {}, "limits": limits,
         }  # fmt: skip
         _fill(self, values)
 

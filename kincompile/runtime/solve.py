@@ -26,10 +26,12 @@ from kincompile.errors import (
     BranchSwitchWarning,
     CornerWarning,
     InputError,
+    KincompileWarning,
     SingularConfigurationWarning,
     SolveError,
 )
 from kincompile.names import listed
+from kincompile.runtime.engine.code import LIMITS
 from kincompile.runtime.follow import follow
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.problem import problem
@@ -350,15 +352,26 @@ def solution_of(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
     """Put names, parameters and a verdict to the numbers, and warn of what was passed."""
     warn(inputs, motion, outcome, 5)
     message, reasons = explained(inputs, motion, outcome)
+    fields = motion.fields()
+    if beyond := _limits_left(inputs, fields["q"]):
+        warnings.warn(f"{inputs.code.name}: {beyond}", KincompileWarning, stacklevel=4)
     return Solution(
         success=outcome.status is Status.CONVERGED,
-        message=f"{message} {motion.note}".rstrip(),
+        message=" ".join(filter(None, (message, motion.note, beyond))),
         doubt=motion.note,
         reasons=reasons,
         t=inputs.t,
-        **motion.fields(),
+        **fields,
         **inputs.about(),
     )
+
+
+def _limits_left(inputs: Inputs, q: Array) -> str:
+    """Say which limits of joints a motion leaves."""
+    if LIMITS not in inputs.code.makers:
+        return ""
+    sentences = inputs.code.request(LIMITS)(q, inputs.t, inputs.p)
+    return " ".join(f"{sentence}." for sentence in sentences)
 
 
 def warn(inputs: Inputs, motion: Motion, outcome: Outcome, level: int) -> None:

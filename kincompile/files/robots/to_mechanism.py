@@ -22,6 +22,7 @@ from kincompile.space.joints import (
     Universal,
 )
 from kincompile.space.joints import RelativeTranslation as Slide
+from kincompile.space.limits import JointLimit
 from kincompile.space.mechanism import Mechanism
 from kincompile.space.points import SpatialPoint
 
@@ -115,8 +116,35 @@ class _Builder:
             link: ("ground" if body == robot.root else self._names[body], place)
             for link, (body, place) in self._host.items()
         }
+        made.limits = [
+            self._limit(joint, *joint.limits)
+            for joint in robot.joints.values()
+            if joint.freedoms == 1
+            and joint.limits is not None
+            and joint.limits[0] < joint.limits[1]
+        ]
         self._show_names()
         return made
+
+    def _limit(self, joint: Joint, least: float, greatest: float) -> JointLimit:
+        """Return the limits of a hinge or a slide."""
+        sides = [self._host[joint.parent], self._host[joint.child]]
+        bodies = ["ground" if body == self._robot.root else self._names[body] for body, _ in sides]
+        frames = [place @ at for (_, place), at in zip(sides, (joint.at, joint.on), strict=True)]
+        name, axis = self._joint_names[joint.name], joint.axes[0]
+        return JointLimit(
+            name,
+            "m" if joint.kind == "prismatic" else "rad",
+            (bodies[0], bodies[1]),
+            (frames[0], frames[1]),
+            axis,
+            beside(axis),
+            least,
+            greatest,
+            joint.reference,
+            float(self._x[self._tree.places[joint.name]][0]) + joint.reference,
+            name if joint.name in self._parameters else "",
+        )
 
     def _show_names(self) -> None:
         pairs = {**self._joint_names, **self._names}

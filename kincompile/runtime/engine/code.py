@@ -229,6 +229,9 @@ DRIVERS: Kind[Callable[[float, Array], Sequence[tuple[Any, ...]]]] = Kind("drive
 FOUR_BARS: Kind[Callable[[Array], Sequence[tuple[Any, ...]]]] = Kind("four-bars")
 """What describes the four-bars with parameters."""
 
+LIMITS: Kind[Callable[[Array, Array, Array], Sequence[str]]] = Kind("limits")
+"""What says which limits of joints positions leave at times, with parameters."""
+
 SENSITIVITIES: Kind[Compiled | None] = Kind(
     "sensitivities",
     "and that has no sensitivities: differentiate a part of it, or",

@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,11 @@ from scipy.spatial.transform import Rotation
 import kincompile as kc
 from kincompile import spatial
 from kincompile.cli import cli
+from kincompile.errors import KincompileWarning
 from kincompile.files.robots.closing import Tree, led
 from kincompile.files.robots.urdf import read_urdf
 from kincompile.files.robots.xml_text import read_xml
+from kincompile.model.mechanism import changed
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import Hull, shape_of
 
@@ -473,3 +476,26 @@ def test_that_outlines_in_space_are_checked() -> None:
         kc.ModelError, match=r"corner 3, \(0, 1\), is not \(xi, eta, zeta\); give three"
     ):
         m.system()
+
+
+@pytest.mark.filterwarnings(WARNED)
+def test_that_limits_that_a_motion_leaves_are_named_with_time_and_value(tmp_path: Path) -> None:
+    """The crank turns by 1 rad in 1 s from 0.3; the rocker by the law of cosines."""
+    t = np.linspace(0, 1, 101)
+    rocker = np.array([rocker_angles(0.3 + x)[0] for x in t])
+    middle = (rocker.min() + rocker.max()) / 2
+    text = FOUR_BAR.format(-9, 1.1, -4, middle)
+    m = model(tmp_path, text, motors=["crank"], pose={"crank": 0.3, "rocker": rocker[0]})
+    m = changed(m, constraints=list(m.constraints))
+    k = next(k for k, item in enumerate(m.constraints) if item.name == "crank")
+    m.constraints[k] = replace(m.constraints[k], angle=m.constraints[k].angle + kc.t)
+    module = kc.compile(m)
+    with pytest.warns(KincompileWarning, match="Joint crank leaves its limit of 1.1 rad") as seen:
+        said = kc.solve(module, t).message
+    assert str(seen[0].message).removeprefix("n_4_bar: ") in said
+    assert "Joint crank leaves its limit of 1.1 rad at t = 0.81; it is 1.3 at t = 1." in said
+    first, worst = int(np.argmax(rocker > middle)), int(np.argmax(rocker))
+    assert (
+        f"Joint rocker leaves its limit of {middle:.6g} rad at t = {t[first]:.10g}; it is "
+        f"{rocker[worst]:.6g} at t = {t[worst]:.10g}."
+    ) in said
