@@ -97,7 +97,9 @@ class Sizes:
         found: list[Any] = []
         with np.errstate(all="ignore"):
             for operation, *operands in graph.nodes:
-                unknown = operation == "input" and operands[0] not in given
+                # A block that was solved depends on the right side, and no entry on it.
+                unknown = operation == "linear"
+                unknown |= operation == "input" and operands[0] not in given
                 found.append(np.nan if unknown else apply(operation, operands, found, given, {}))
         for row, entries in matrix.items():
             for column, node in entries.items():

@@ -29,6 +29,7 @@ SMALL, LARGE = ["5bar_linkage_iso3d", "welded_four_bar"], [
     "5bar_linkage", "battobot_6d", "cassie_like", "digit_like", "wl16_like", "robotiq_2f85",
 ]  # fmt: skip
 WARNED = "ignore::kincompile.RedundantConstraintWarning"
+BEYOND = "ignore:.* leaves its limit of"
 
 
 def oracle(name: str) -> dict[str, Any]:
@@ -37,7 +38,7 @@ def oracle(name: str) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.filterwarnings(WARNED)
+@pytest.mark.filterwarnings(WARNED, BEYOND)
 @pytest.mark.parametrize(
     "name", [*SMALL, *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE)]
 )
@@ -163,6 +164,7 @@ def test_that_a_mimic_joint_follows(tmp_path: Path, first: float) -> None:
     assert turn[0].as_rotvec() == pytest.approx([0, 0, 0.5 - 2 * first + 0.1], abs=1e-12)
 
 
+@pytest.mark.filterwarnings(BEYOND)
 def test_that_a_coupling_drives_backwards_over_turns(tmp_path: Path) -> None:
     text = TREE.format("continuous", "").replace("</robot>", BELT)
     m = model(tmp_path, text, motors=["second"], pose={"second": 7.5, "first": 15})
