@@ -6,12 +6,16 @@ them knows how it is printed; `notation` does.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, is_dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import sympy
 
 from kincompile.calculus.expressions import Expression, Scalar, Vector
+
+if TYPE_CHECKING:
+    from collections.abc import Container
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,13 +156,22 @@ def column(values: tuple[Formula, ...]) -> Matrix:
     return Matrix(tuple((value,) for value in values))
 
 
-def size(formula: object) -> int:
-    """Return the number of nodes of a formula."""
-    if isinstance(formula, tuple):
-        return sum(size(item) for item in formula)
-    if not is_dataclass(formula):
-        return 0
-    return 1 + sum(size(getattr(formula, item.name)) for item in fields(formula))
+def size(formula: object, most: float = math.inf, atoms: Container[object] = ()) -> int:
+    """Return the number of nodes of a formula, of which atoms are one each.
+
+    The count ends when there are more than `most`.
+    """
+    waiting, count = [formula], 0
+    while waiting and count <= most:
+        item = waiting.pop()
+        if isinstance(item, tuple):
+            waiting.extend(item)
+        elif is_dataclass(item):
+            count += 1
+            if item in atoms:
+                continue
+            waiting.extend(getattr(item, part.name) for part in fields(item))
+    return count
 
 
 def decimals(values: object, digits: int = 6) -> Matrix:

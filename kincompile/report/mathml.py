@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from sympy.printing.mathml import MathMLPresentationPrinter
 from sympy.printing.pretty.pretty_symbology import greek_unicode
 
-from kincompile.report.notation import Notation
+from kincompile.report.pieces import Breakable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -55,7 +55,7 @@ def index_text(index: str) -> str:
     return index.translate(SLANTED) if len(index) <= 2 else index
 
 
-class MathMLPrinter(Notation, MathMLPresentationPrinter):
+class MathMLPrinter(Breakable, MathMLPresentationPrinter):
     """Prints formulas as the children of a `math` element.
 
     Letters are those of Unicode's mathematical alphabets, and brackets grow with what they hold:
@@ -101,6 +101,9 @@ class MathMLPrinter(Notation, MathMLPresentationPrinter):
     def _operator(self, text: str) -> Element:
         text = OPERATORS.get(text, text)
         return self._element("mo", text)
+
+    def _bracket(self, text: str) -> Element:
+        return self._element("mo", text, stretchy="false")
 
     def _leading(self, text: str) -> Element:
         return self._element("mo", OPERATORS.get(text, text), form="infix")

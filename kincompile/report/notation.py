@@ -210,11 +210,11 @@ class Notation:
         return self._row([self._transposed(expr.left), self._factor(expr.right)])
 
     def _print_Transposed(self, expr: fm.Transposed) -> Printed:
-        if isinstance(expr.vector, ex.VectorSum) and any(map(_is_slope, expr.vector.terms)):
+        if isinstance(expr.vector, ex.VectorSum) and any(map(is_slope, expr.vector.terms)):
             return self._row_of(expr.vector.terms)
-        if _is_slope(expr.vector):
+        if is_slope(expr.vector):
             return self._print(expr.vector)
-        is_negative, magnitude = _signed(expr.vector)
+        is_negative, magnitude = signed(expr.vector)
         minus = [self._operator("-")] if is_negative else []
         return self._row([*minus, self._transposed(magnitude)])
 
@@ -222,7 +222,7 @@ class Notation:
         """Return a sum of rows: vectors transposed, and rows of slopes."""
         parts: list[Printed] = []
         for term in terms:
-            is_negative, magnitude = _signed(term)
+            is_negative, magnitude = signed(term)
             if is_negative or parts:
                 parts.append(self._operator("-" if is_negative else "+"))
             parts.append(self._print(fm.Transposed(magnitude)))
@@ -288,7 +288,7 @@ class Notation:
             return self._numeral("0")
         parts: list[Printed] = []
         for k, term in enumerate(terms):
-            is_negative, magnitude = _signed(term)
+            is_negative, magnitude = signed(term)
             if is_negative or k:
                 parts.append(self._operator("-" if is_negative else "+"))
             # A sum inside a sum comes from the code, where the order of addition matters.
@@ -296,13 +296,13 @@ class Notation:
         return self._row(parts)
 
     def _print_Product(self, expr: Any) -> Printed:
-        is_negative, magnitude = _signed(expr)
+        is_negative, magnitude = signed(expr)
         if is_negative:
             return self._row([self._operator("-"), self._factor(magnitude)])
         return self._product(expr.factors)
 
     def _print_Scaled(self, expr: ex.Scaled) -> Printed:
-        is_negative, magnitude = _signed(expr)
+        is_negative, magnitude = signed(expr)
         if is_negative:
             return self._row([self._operator("-"), self._factor(magnitude)])
         factors = expr.factor.factors if isinstance(expr.factor, ex.Product) else (expr.factor,)
@@ -310,13 +310,13 @@ class Notation:
 
     def _product(self, factors: Sequence[Any]) -> Printed:
         """Return a product: numbers first, rates last, reciprocals below the fraction bar."""
-        below = [item.base for item in factors if _is_reciprocal(item)]
-        above = [item for item in factors if not _is_reciprocal(item)]
-        above.sort(key=_place)
+        below = [item.base for item in factors if is_reciprocal(item)]
+        above = [item for item in factors if not is_reciprocal(item)]
+        above.sort(key=place_of)
         if not below:
             return self._juxtaposed(above)
         divisor = self._juxtaposed(below)
-        if fm.size(tuple(above)) <= LONGEST_NUMERATOR:
+        if fm.size(tuple(above), LONGEST_NUMERATOR) <= LONGEST_NUMERATOR:
             return self._fraction(self._juxtaposed(above), divisor)
         inverse = self._fraction(self._numeral("1"), divisor)
         return self._row([inverse, self._thin_space(), *(self._factor(item) for item in above)])
@@ -426,41 +426,16 @@ class Notation:
     def _print_Equated(self, expr: fm.Equated) -> Printed:
         return self._joined("=", expr.parts)
 
-    def pieces(self, formula: Any) -> list[Printed]:
-        """Return a formula in pieces between which a line may be broken: at = and at + and -."""
-        if not isinstance(formula, fm.Equated):
-            return [self._print(formula)]
-        pieces: list[Printed] = []
-        for k, part in enumerate(formula.parts):
-            lead = [self._leading("=")] if k else []
-            for sign, magnitude in self._terms(part):
-                signs = [self._leading(sign) if pieces else self._operator(sign)] if sign else []
-                pieces.append(self._row([*lead, *signs, magnitude]))
-                lead = []
-        return pieces
-
-    def _terms(self, part: Any) -> list[tuple[str, Printed]]:
-        """Return sign and magnitude of the terms of a sum; anything else is one term."""
-        if isinstance(part, ex.Sum | ex.VectorSum) and part.terms:
-            terms: Sequence[Any] = part.terms
-        else:
-            return [("", self._print(part))]
-        found = []
-        for k, term in enumerate(terms):
-            is_negative, magnitude = _signed(term)
-            sign = "-" if is_negative else "+" if k else ""
-            found.append((sign, self._factor(magnitude)))
-        return found
-
     def _print_Matrix(self, expr: fm.Matrix) -> Printed:
         return self._array([[self._short(cell) for cell in row] for row in expr.rows])
 
 
-def _is_slope(term: Any) -> bool:
+def is_slope(term: Any) -> bool:
+    """Return whether a term of a row is a slope, with or without a factor."""
     return isinstance(term.vector if isinstance(term, ex.Scaled) else term, ex.RowOfSlope)
 
 
-def _signed(term: Any) -> tuple[bool, Any]:
+def signed(term: Any) -> tuple[bool, Any]:
     """Return whether a term has a minus in front, and the term without it."""
     match term:
         case ex.Number(value) if value < 0:
@@ -471,16 +446,17 @@ def _signed(term: Any) -> tuple[bool, Any]:
             factors = rest if value == -1 else [ex.Number(-value), *rest]
             return True, factors[0] if len(factors) == 1 else ex.Product(tuple(factors))
         case ex.Scaled(factor, vector):
-            is_negative, magnitude = _signed(factor)
+            is_negative, magnitude = signed(factor)
             return is_negative, vector if magnitude == ex.ONE else ex.Scaled(magnitude, vector)
     return False, term
 
 
-def _is_reciprocal(factor: Any) -> bool:
+def is_reciprocal(factor: Any) -> bool:
+    """Return whether a factor stands below a fraction bar."""
     return isinstance(factor, ex.Power) and factor.exponent == -1
 
 
-def _place(factor: Any) -> int:
+def place_of(factor: Any) -> int:
     """Return where a factor stands: numbers first, rates and differentials last."""
     if isinstance(factor, ex.Number | fm.Decimal):
         return 0

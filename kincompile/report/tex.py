@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from sympy.printing.latex import LatexPrinter
 
-from kincompile.report.notation import GREEK, Notation
+from kincompile.report.notation import GREEK
+from kincompile.report.pieces import Breakable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -34,7 +35,7 @@ def escape(text: str) -> str:
     return "".join(SPECIAL.get(character, character) for character in text)
 
 
-class TexPrinter(Notation, LatexPrinter):
+class TexPrinter(Breakable, LatexPrinter):
     """Prints formulas as LaTeX in mathematical mode; amsmath is all that it needs."""
 
     def __init__(

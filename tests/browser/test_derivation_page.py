@@ -102,6 +102,19 @@ def test_that_nothing_is_wider_than_the_page(open_page: Any, name: str, width: i
     page.close()
 
 
+def test_that_no_formula_is_wider_than_its_column(open_page: Any, name: str) -> None:
+    """The written out gamma of a cam had 13,500 pixels in one line."""
+    page = open_page(name)
+    page.evaluate("document.querySelectorAll('details').forEach(item => { item.open = true; })")
+    formulas = page.locator(".eq.wide")
+    assert formulas.count() > 20
+    assert (
+        formulas.evaluate_all("all => all.filter(e => e.scrollWidth > e.clientWidth + 1).length")
+        == 0
+    )
+    page.close()
+
+
 def test_that_the_page_says_nothing_and_asks_for_nothing(open_page: Any, name: str) -> None:
     page = open_page(name)
     page.wait_for_load_state("networkidle")

@@ -8,7 +8,7 @@ import pytest
 import sympy
 
 import kincompile as kc
-from kincompile.calculus.expressions import Number, Product, Sum, Symbol, VectorSymbol
+from kincompile.calculus.expressions import Number, Power, Product, Sum, Symbol, VectorSymbol
 from kincompile.calculus.rotations import turned
 from kincompile.calculus.symbols import i, j, s_i, s_j, unit
 from kincompile.derivations.joint_terms import abbreviations
@@ -147,6 +147,31 @@ def test_that_a_long_sum_is_in_pieces_between_which_a_line_may_break() -> None:
     assert [piece.count("<math") for piece in pieces] == [1] * 5
     assert 'form="infix">=<' in pieces[1]
     assert "&#8722;" in pieces[3]
+
+
+def test_that_long_brackets_and_products_are_broken_and_nothing_is_lost() -> None:
+    letters = [Symbol(name) for name in "abcdefgh"]
+    inner = Sum((*letters, Product((Number(Fraction(-2)), *letters[:3]))))
+    long = Sum(
+        (
+            Product((letters[0], inner, Power(inner, 2))),
+            Product((letters[1], Call("sin", (inner,)))),
+        )
+    )
+    pieces = MathMLPrinter().display(Equated((Symbol("u"), long))).split("<wbr>")
+    plain, *broken = (
+        "".join(ET.fromstring(text).itertext()) for text in (MathMLPrinter().math(long), *pieces)
+    )
+    assert max(map(len, broken)) <= 8
+    assert "".join(broken) == f"{letters_of('u')}={plain}"
+    for text in (TexPrinter().pieces(Equated((Symbol("u"), long))), broken):
+        joined = "".join(text)
+        assert joined.count("(") == joined.count(")") == 3
+
+
+def letters_of(name: str) -> str:
+    """Return a name as MathML writes it."""
+    return "".join(ET.fromstring(MathMLPrinter().math(Symbol(name))).itertext())
 
 
 def test_that_text_is_escaped_for_latex() -> None:
