@@ -103,9 +103,10 @@ export class Editing {
     if (isSame) {
       this.bound.take(model);
       this.run();
-      if (!this.motion.failed) return;
-    }
-    this.bound = new Bound(model);
+      if (this.motion.failed?.index !== 0) return;
+      this.motion = this.event = null;
+      this.bound.judge(model);
+    } else this.bound = new Bound(model);
     this.structure = structure;
     if (this.bound.factors) this.run();
   }
