@@ -21,6 +21,7 @@ from kincompile.files.robots.robot import (
     Mass,
     Robot,
     Shape,
+    from_quaternion,
     order_tree,
     placement,
 )
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from kincompile.files.robots.robot import Array
 
 MOST_INCLUDES = 50
 """Files that are included."""
@@ -192,13 +192,13 @@ class _MjcfReader(XmlReader):
         self._bodies = ["world", *(model.body(k).name for k in range(1, model.nbody))]
         self._joints: dict[int, str] = {}
         for k, name in enumerate(self._bodies[1:], 1):
-            inertia = placement(model.body_ipos[k], _matrix(model.body_iquat[k]))
+            inertia = from_quaternion(model.body_ipos[k], model.body_iquat[k])
             own = Mass(model.body_mass[k], np.zeros(3), np.diag(model.body_inertia[k]))
             self._body(model, k, name)
             robot.links[name] = own.seen_from(inertia) if name in self._heavy else None
         for k in range(model.ngeom):
             if kind := GEOMS.get(int(model.geom_type[k])):
-                at = placement(model.geom_pos[k], _matrix(model.geom_quat[k]))
+                at = from_quaternion(model.geom_pos[k], model.geom_quat[k])
                 body = self._bodies[model.geom_bodyid[k]]
                 robot.shapes.append(Shape.of(body, kind, model.geom_size[k].tolist(), at))
         robot.meshes = self._meshes
@@ -214,7 +214,7 @@ class _MjcfReader(XmlReader):
     def _body(self, model: Any, k: int, name: str) -> None:
         """Add the joints of a body; several act in turn, with links of no mass between them."""
         parent = self._bodies[model.body_parentid[k]]
-        at = placement(model.body_pos[k], _matrix(model.body_quat[k]))
+        at = from_quaternion(model.body_pos[k], model.body_quat[k])
         line = self._lines.get(name, 1)
         first = model.body_jntadr[k]
         numbers = [
@@ -254,13 +254,13 @@ class _MjcfReader(XmlReader):
             return
         if "site1" in self._equalities[k].attributes:
             links = [self._bodies[model.site_bodyid[j]] for j in ids]
-            a, b = (placement(model.site_pos[j], _matrix(model.site_quat[j])) for j in ids)
+            a, b = (from_quaternion(model.site_pos[j], model.site_quat[j]) for j in ids)
         else:
             links = [self._bodies[j] for j in ids]
             if kind == CONNECT:
                 a, b = placement(data[:3]), placement(data[3:6])
             else:
-                a, b = placement(data[3:6], _matrix(data[6:10])), placement(data[:3])
+                a, b = from_quaternion(data[3:6], data[6:10]), placement(data[:3])
         axes = np.eye(3)[2], np.eye(3)[2]
         joint = "spherical" if kind == CONNECT else "fixed"
         self._robot.closures.append(Closure(name, joint, (links[0], links[1]), (a, b), axes, line))
@@ -272,15 +272,3 @@ def _is_wild(word: str) -> bool:
         return not abs(float(word)) <= LARGEST
     except ValueError:
         return False
-
-
-def _matrix(quaternion: Array) -> Array:
-    """Return the matrix (3, 3) of (w, x, y, z)."""
-    w, x, y, z = (quaternion / np.linalg.norm(quaternion)).tolist()
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kincompile.errors import InputError, ModelError
 from kincompile.files.content import file_content
@@ -133,12 +134,9 @@ def _begin(tree: Tree, pose: Mapping[str, Any]) -> Array:
 
 def _of_quaternion(values: Array, name: str) -> Array:
     """Return the rotation vector of (w, x, y, z)."""
-    length = np.linalg.norm(values)
-    if not length:
+    if not np.linalg.norm(values):
         raise InputError(f"pose has zeros for the ball {name!r}; (1, 0, 0, 0) is no turn")
-    w, *v = (values / length).tolist()
-    size = float(np.linalg.norm(v))
-    return np.array(v) * (2 * np.arctan2(size, w) / size if size > 0 else 2.0)
+    return np.asarray(Rotation.from_quat(np.roll(values, -1)).as_rotvec())
 
 
 def _motors(tree: Tree, x: Array, given: Sequence[str] | None) -> list[str]:

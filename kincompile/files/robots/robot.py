@@ -12,6 +12,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kincompile.names import MOST_CHARACTERS, suggestion
 
@@ -253,17 +254,12 @@ def placement(r: Sequence[float] | Array, turn: Array | None = None) -> Array:
 
 def from_rpy(r: Sequence[float], angles: Sequence[float]) -> Array:
     """Return the placement by roll, pitch and yaw about the fixed axes x, y, z."""
-    (a, b, c), (sa, sb, sc) = map(math.cos, angles), map(math.sin, angles)
-    return placement(
-        r,
-        np.array(
-            [
-                [c * b, c * sb * sa - sc * a, c * sb * a + sc * sa],
-                [sc * b, sc * sb * sa + c * a, sc * sb * a - c * sa],
-                [-sb, b * sa, b * a],
-            ]
-        ),
-    )
+    return placement(r, Rotation.from_euler("xyz", angles).as_matrix())
+
+
+def from_quaternion(r: Sequence[float] | Array, wxyz: Sequence[float] | Array) -> Array:
+    """Return the placement by (w, x, y, z), of any length."""
+    return placement(r, Rotation.from_quat(np.roll(wxyz, -1)).as_matrix())
 
 
 def skew(v: Array) -> Array:
