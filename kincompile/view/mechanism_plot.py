@@ -12,9 +12,8 @@ from kincompile.names import listed, suggestion
 from kincompile.report.picture import FILL
 from kincompile.runtime.results.columns import titled
 from kincompile.view.drawing import drawing
-from kincompile.view.marks import GROUND_FRAME
+from kincompile.view.picture import colour_of
 from kincompile.view.polylines import polylines
-from kincompile.view.shapes import GROUND_COLOUR
 from kincompile.view.worlds import PLANE, PROJECTIONS, drawn_by
 
 if TYPE_CHECKING:
@@ -223,8 +222,7 @@ def write_name(ax: Axes, name: str, place: Sequence[float]) -> Callable[[Sequenc
 
 def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) -> Any:
     look, points = polyline.look, polyline.at(q)
-    is_ground = polyline.frame == GROUND_FRAME
-    colour = look.colour or (GROUND_COLOUR if is_ground else f"C{polyline.frame.index % 10}")
+    colour = look.colour or colour_of(polyline.frame)
     style: dict[str, Any] = {"linewidth": look.width, "zorder": 2 + order * 1e-3}
     if polyline.is_area:
         face = look.area or (colour, FILL)

@@ -10,6 +10,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.view.animation import frame_rows
+from kincompile.view.shapes import HUES
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 import matplotlib as mpl
@@ -17,6 +18,9 @@ from matplotlib import pyplot as plt
 from matplotlib.animation import AbstractMovieWriter, PillowWriter
 from matplotlib.colors import to_rgba
 from PIL import Image, ImageSequence
+
+BODY = HUES["light"]
+"""Colours of bodies, those of the page."""
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +61,7 @@ class Recorder(AbstractMovieWriter):
     def grab_frame(self, **savefig_kwargs):
         (ax,) = self.fig.axes
         bar: Any
-        bar, *_ = [area for area in ax.patches if to_rgba("C0")[:3] == area.get_facecolor()[:3]]
+        bar, *_ = [area for area in ax.patches if to_rgba(BODY[0])[:3] == area.get_facecolor()[:3]]
         self.bars.append(bar.get_xy()[:-1])
         self.titles.append(ax.get_title(loc="left"))
 

@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 
 import kincompile as kc
-from kincompile.view.shapes import DRIVER_COLOUR, GROUND_COLOUR
+from kincompile.view.shapes import DRIVER_COLOUR, GROUND_COLOUR, HUES
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed")
 from matplotlib import pyplot as plt
 from matplotlib.colors import to_rgba
 
 R, L = 0.1, 0.3
+
+
+BODY = HUES["light"]
+"""Colours of bodies, those of the page."""
 
 
 @pytest.fixture(scope="module")
@@ -85,9 +89,9 @@ def test_that_pins_bars_and_slider_are_those_of_the_triangle(slider_crank):
     ax = kc.plot_mechanism(slider_crank, q)
     pins = centres(areas(ax, "white"))
     np.testing.assert_allclose(pins, [(0, 0), a, b], atol=1e-12)
-    assert has_bar(ax, "C0", (0, 0), a)
-    assert has_bar(ax, "C1", a, b)
-    (block,) = areas(ax, "C2")
+    assert has_bar(ax, BODY[0], (0, 0), a)
+    assert has_bar(ax, BODY[1], a, b)
+    (block,) = areas(ax, BODY[2])
     np.testing.assert_allclose(block.mean(axis=0), b, atol=1e-12)
     assert np.ptp(block[:, 0]) > np.ptp(block[:, 1]) > 0
     assert ax.get_aspect() == 1
@@ -112,7 +116,7 @@ def test_that_the_guess_is_drawn_without_a_position(slider_crank):
 def test_that_parameters_change_the_shapes(slider_crank):
     q, _, _ = slider_crank_position(0.7)
     ax = kc.plot_mechanism(slider_crank, q, p={"r": 0.2})
-    assert has_bar(ax, "C0", (0, 0), (0.2 * np.cos(0.7), 0.2 * np.sin(0.7)))
+    assert has_bar(ax, BODY[0], (0, 0), (0.2 * np.cos(0.7), 0.2 * np.sin(0.7)))
 
 
 MECHANISMS = (
@@ -153,7 +157,7 @@ def test_that_gears_have_their_radius_and_turn(example_named):
     solution = example.solution
     k = 13
     ax = kc.plot_mechanism(example.model, solution.q[k])
-    sun, planet = areas(ax, "C0")[0], areas(ax, "C2")[0]
+    sun, planet = areas(ax, BODY[0])[0], areas(ax, BODY[2])[0]
     x, y = solution["x_planet"][k], solution["y_planet"][k]
     np.testing.assert_allclose(np.hypot(*sun.T), 0.02, rtol=1e-12)
     np.testing.assert_allclose(np.hypot(*(planet - (x, y)).T), 0.03, rtol=1e-12)
@@ -161,7 +165,7 @@ def test_that_gears_have_their_radius_and_turn(example_named):
     angle = 2 * np.pi * solution.t[k] / 5
     np.testing.assert_allclose((x, y), (0.05 * np.cos(angle), 0.05 * np.sin(angle)), atol=1e-12)
     turned = 2 * np.pi * solution.t[k]
-    assert has_line(ax, "C0", [(0, 0), (0.02 * np.cos(turned), 0.02 * np.sin(turned))])
+    assert has_line(ax, BODY[0], [(0, 0), (0.02 * np.cos(turned), 0.02 * np.sin(turned))])
     ring = next(line for line in lines(ax, GROUND_COLOUR) if len(line) > 60)
     np.testing.assert_allclose(np.hypot(*ring.T), 0.08, rtol=1e-12)
 
@@ -171,10 +175,10 @@ def test_that_a_cam_has_its_profile_and_touches_the_face(example_named):
     k = 31
     solution = example.solution
     ax = kc.plot_mechanism(example.model, solution.q[k])
-    cam = max(areas(ax, "C0"), key=len)
+    cam = max(areas(ax, BODY[0]), key=len)
     polar = np.arctan2(*cam.T[::-1]) - solution["phi_cam"][k]
     np.testing.assert_allclose(np.hypot(*cam.T), 0.04 + 0.01 * (1 - np.cos(polar)), rtol=1e-9)
-    (face,) = [line for line in lines(ax, "C1") if len(line) == 2]
+    (face,) = [line for line in lines(ax, BODY[1]) if len(line) == 2]
     # The highest of 180 points of the profile is next to the point of contact.
     np.testing.assert_allclose(face[:, 1], cam[:, 1].max(), rtol=2e-4)
 
