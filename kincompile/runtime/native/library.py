@@ -78,12 +78,11 @@ KINEMATICS = Part(FULL, ("-D_WITHOUT_SETS", "-D_ONLY_KINEMATICS"))
 SETS = Part(FULL, ("-D_WITHOUT_ONE",))
 """What many parameter sets need: built on request."""
 
-LARGEST_VECTORIZED = 302_000
-"""Characters of source up to which it is optimized in full, an angle's cosine and sine, which are
-written in line, counted as ANGLE, and the start, which is left out, with 28,000. In full takes 2 s
-for 9 coordinates in the plane, and some 5 s for three bodies in space: gcc combines
-instructions in time that grows with the square of a function's length. Beyond, code runs at half to
-a quarter of the speed, and 99 coordinates take 3 s instead of minutes."""
+LARGEST_IN_FULL, LARGEST_VECTORIZED = 302_000, 1_200_000
+"""Characters of source up to which it is optimized in full, and up to which loops over points take
+several at once. An angle's cosine and sine, which are written in line, count as ANGLE. gcc combines
+instructions in time that grows with the square of a function's length: a Delta robot takes 2 s, a
+platform of 91 coordinates 10 s, and 5 s where points are taken one by one, at half the speed."""
 ANGLE = 3_000
 
 LONGEST_OPTIMIZED = 400_000
@@ -170,8 +169,10 @@ def _level(source: str, wanted: tuple[str, ...]) -> tuple[str, ...]:
     """Return the flags that say how far code is optimized: as far as it does not take a minute."""
     if max(map(len, source.split("\n}\n"))) > LONGEST_OPTIMIZED:
         return ("-O0",)
-    is_large = len(source) + ANGLE * source.count("cos_sin(") > LARGEST_VECTORIZED
-    return ("-O1",) if is_large else wanted
+    size = len(source) + ANGLE * source.count("cos_sin(")
+    if size > LARGEST_VECTORIZED:
+        return ("-O1",)
+    return QUICK if wanted == FULL and size > LARGEST_IN_FULL else wanted
 
 
 def _compiler() -> tuple[str, ...]:

@@ -188,6 +188,17 @@ def test_large_sources_are_not_optimized_for_minutes(
     assert (tmp_path / "seen").read_text() == f"{level}\n"
 
 
+@pytest.mark.parametrize(("limit", "level"), [(10**6, "-O3"), (1000, "-O2")])
+def test_that_what_is_built_on_request_is_optimized_by_its_size(
+    monkeypatch, compiler, cache, tmp_path, limit, level
+):
+    module = kc.compile(tiny(), target="c")
+    compiler(f'echo "$1" > {tmp_path}/seen; exec REAL "$@"')
+    monkeypatch.setattr(c_library, "LARGEST_IN_FULL", limit)
+    module.kinematics(module.GUESS, 0 * module.GUESS, 0.5)
+    assert (tmp_path / "seen").read_text() == f"{level}\n"
+
+
 @pytest.mark.parametrize(("said", "are_named"), [("clang version 17", False), (GCC, True)])
 def test_that_flags_of_passes_are_for_gcc_alone(
     monkeypatch, compiler, cache, tmp_path, said, are_named
