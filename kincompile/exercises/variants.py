@@ -195,9 +195,7 @@ class VariantBuilder:
             for name, item in declared_fields(type(body.written())).items()
             if item.schema == EXPRESSION and (value := getattr(body, name, None)) is not None
         }
-        solids: Any = [body.outline] if body.kind is PLANAR else body.outline
-        moved = [[self._moved_by(x, signs, factor) for x in corners] for corners in solids]
-        outline = moved[0] if body.kind is PLANAR else moved
+        outline = body.outline_by(lambda corner: self._moved_by(corner, signs, factor))
         centre = self._moved_by(body.centre, signs, factor)
         guess = self._guess(body, factor)
         own |= {"guess": guess, "outline": outline, "centre": centre}

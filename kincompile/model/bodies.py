@@ -18,7 +18,7 @@ from kincompile.model.expressions import NotAnExpressionError, as_expression, nu
 from kincompile.names import rate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from kincompile.model.expressions import Scalar, Scalars
 
@@ -126,6 +126,15 @@ class Body(Shown):
         """Return its name, coordinates and guess."""
         names = ", ".join(self.coordinates)
         return f"{self.name} with {names}, guess ({', '.join(map(str, self.guess))})"
+
+    @property
+    def solids(self) -> Sequence[tuple[str, Any]]:
+        """What its outline is made of, the corners of each, and what tells it from others."""
+        return [("", self.outline)]
+
+    def outline_by(self, change: Callable[[Any], Any]) -> list[Any]:
+        """Return its outline with other corners."""
+        return [change(corner) for corner in self.outline]
 
     @property
     def is_heavy(self) -> bool:

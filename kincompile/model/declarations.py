@@ -162,21 +162,17 @@ def body_coordinates(
 def check_outlines(bodies: tuple[Body, ...], values: dict[str, float], problems: list[str]) -> None:
     """Check that every outline is a list of corners, in space a list of such lists, or none."""
     for body in bodies:
-        where = f"outline of {body.name}"
-        if body.kind.frame.size == len(_PLANE):
-            _check_corners(body.outline, where, "a polygon", _PLANE, values, problems)
-            continue
-        for k, solid in enumerate(body.outline, 1):
-            _check_corners(solid, f"{where}, solid {k}", "a solid", _SPACE, values, problems)
+        axes = _LOCAL[: len(body.kind.axes)]
+        for label, corners in body.solids:
+            _check_corners(corners, f"outline of {body.name}{label}", axes, values, problems)
 
 
-_PLANE, _SPACE = ("xi", "eta"), ("xi", "eta", "zeta")
+_LOCAL = ("xi", "eta", "zeta")
 
 
 def _check_corners(
     given: Any,
     where: str,
-    what: str,
     axes: Sequence[str],
     values: dict[str, float],
     problems: list[str],
@@ -188,6 +184,7 @@ def _check_corners(
         problems.append(f"{where}: {given!r} is not a list of corners {components}")
         return
     if 0 < len(corners) < least:
+        what = ("a polygon", "a solid")[len(axes) - 2]
         problems.append(f"{where}: it has {len(corners)} corners; {what} has {least} or more")
     for k, corner in enumerate(corners, 1):
         if len(corner) != len(axes):

@@ -15,6 +15,8 @@ from kincompile.names import shown
 from kincompile.space.points import SpatialPoint
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     import sympy
 
     from kincompile.model.expressions import Scalars
@@ -111,6 +113,15 @@ class SpatialBody(Body):
         """Return what a file has of it: Euler parameters, whichever way they were given."""
         given = {"mass": self.mass, "inertia": self.inertia, "centre": self.centre}
         return Placed(self.name, self.guess[:3], self.guess[3:], outline=self.outline, **given)
+
+    @property
+    def solids(self) -> Sequence[tuple[str, Any]]:
+        """The solids of its outline, numbered."""
+        return [(f", solid {k}", corners) for k, corners in enumerate(self.outline, 1)]
+
+    def outline_by(self, change: Callable[[Any], Any]) -> list[Any]:
+        """Return its outline with other corners."""
+        return [[change(corner) for corner in solid] for solid in self.outline]
 
     @property
     def z(self) -> sympy.Expr:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from kincompile.view.marks import Hull, Polygon, Symbol, moves_with
 from kincompile.view.worlds import PLANE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from kincompile.model.bodies import Body
     from kincompile.view.geometry import Geometry
@@ -23,6 +23,12 @@ SAME_POINT = 1e-9
 """Distance, relative to the coordinates, up to which two points of a body are one."""
 
 
+MADE_OF: dict[int, Callable[[BodyFrame, Any], Polygon | Hull]] = {
+    2: Polygon, 3: lambda frame, corners: Hull(frame, corners, corners, "shell"),
+}  # fmt: skip
+"""What an outline is drawn as, by the components of its corners."""
+
+
 def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Polygon | Hull]:
     """Return the outlines of those bodies that have one.
 
@@ -31,12 +37,10 @@ def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Polygon | Hull]
     found: list[Polygon | Hull] = []
     for body in bodies:
         frame = geometry.frames[body.name]
-        if body.kind.frame.size > PLANE:
-            for solid in body.outline:
-                corners: tuple[Point, ...] = tuple(map(geometry.numbers, solid))
-                found.append(Hull(frame, corners, corners, "shell"))
-        elif len(body.outline):
-            found.append(Polygon(frame, tuple(map(geometry.numbers, body.outline))))
+        for _, solid in body.solids:
+            corners: tuple[Point, ...] = tuple(map(geometry.numbers, solid))
+            if corners:
+                found.append(MADE_OF[len(corners[0])](frame, corners))
     return found[::-1]
 
 
