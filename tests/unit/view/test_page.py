@@ -12,6 +12,7 @@ import pytest
 import kincompile as kc
 from kincompile import compiler
 from kincompile.report.templates import template_root
+from kincompile.view.editor import MODULES
 from kincompile.view.modules import WORLDS, modules_of
 from kincompile.view.page import STYLES
 
@@ -202,7 +203,7 @@ def test_that_text_cannot_end_the_script_it_is_in(example_named):
 def test_that_every_script_and_style_sheet_is_used():
     folder = template_root() / "view"
     here = {item.name for item in folder.iterdir() if item.name.endswith((".js", ".css"))}
-    others = {"gallery.js", "gallery.css", "watch.js"}  # of other pages
+    others = {"gallery.js", "gallery.css", "watch.js", "editor.css", *MODULES}  # of other pages
     used = {*STYLES, *(name for dimension in WORLDS for name in modules_of("start.js", dimension))}
     assert here == used | others
     assert "EventSource" not in kc.page(pendulum()).html
