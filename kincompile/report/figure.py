@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from kincompile.report.mathml import index_text, letter_text
 from kincompile.report.notation import has_prime, split_name
-from kincompile.report.picture import svg_element
+from kincompile.report.picture import INDEX, SYMBOL, svg_element
 from kincompile.report.svg import element
 
 if TYPE_CHECKING:
@@ -15,9 +15,6 @@ if TYPE_CHECKING:
 
 FONT = "'Kincompile Math','Latin Modern Math','STIX Two Math','Cambria Math',serif"
 """Fonts of labels; the first is that of the page."""
-
-SIZE = 15
-"""Height of labels [points]."""
 
 
 def as_svg(picture: Picture) -> str:
@@ -41,11 +38,11 @@ def _label(label: PictureLabel, height: float) -> str:
     prime = "\N{PRIME}" if not label.is_vector or has_prime(letter, index) else ""
     text = letter_text(letter, bold=label.is_vector)
     if index:
-        text += element("tspan", index_text(index), dy=4, font_size=f"{0.7 * SIZE:g}")
+        text += element("tspan", index_text(index), dy=4, font_size=f"{INDEX * SYMBOL:g}")
     if prime and label.name not in ("x", "y", "z"):  # of the ground
         text += element("tspan", prime, dy=-4 if index else 0)
     return element(
-        "text", text, x=f"{label.x:.1f}", y=f"{height - label.y + SIZE / 3:.1f}", font_size=SIZE,
-        font_family=FONT, text_anchor="middle", fill=label.colour, paint_order="stroke",
-        stroke="#fff", stroke_opacity=".7", stroke_width=3,
+        "text", text, x=f"{label.x:.1f}", y=f"{height - label.y + SYMBOL / 3:.1f}",
+        font_size=SYMBOL, font_family=FONT, text_anchor="middle", fill=label.colour,
+        paint_order="stroke", stroke="#fff", stroke_opacity=".7", stroke_width=3,
     )  # fmt: skip

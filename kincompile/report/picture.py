@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 DASHES = {"--": "5 4", ":": "1.5 3"}
 """Lengths of dashes and gaps, in widths of a line."""
 
+SYMBOL, INDEX = 15, 0.7
+"""Height of labels [points], and that of their index in parts of it."""
+
 FILL = 0.22
 """Opacity of the pale areas, those of bodies."""
 

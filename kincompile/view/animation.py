@@ -13,7 +13,7 @@ from kincompile.errors import InputError, UnsupportedError, package_of_extra
 from kincompile.names import listed
 from kincompile.runtime.results.columns import TIME_UNIT
 from kincompile.view.drawing import drawing
-from kincompile.view.mechanism_plot import axes_of, draw, write_name
+from kincompile.view.mechanism_plot import axes_of, draw, write_names
 from kincompile.view.svg import Timing, as_svg
 from kincompile.view.traces import described, moving_system, traced_places
 from kincompile.view.worlds import in_view
@@ -137,16 +137,12 @@ def _first_frame(
     move = draw(ax, system, drawn, positions)
     for point in traced:
         ax.plot(*point.at(positions).T, color="0.5", linewidth=1, zorder=1)
-    labels = [
-        (write_name(ax, dot.name, dot.place.at(positions[0]).tolist()), dot.place)
-        for dot in drawn.dots
-    ]
+    named = write_names(ax, drawn, {dot.name: dot.place for dot in drawn.dots}, positions)
     captions = _captions(solution, rows)
 
     def show(frame: int) -> None:
         move(solution.q[rows[frame]])
-        for put, place in labels:
-            put(place.at(solution.q[rows[frame]]).tolist())
+        named(solution.q[rows[frame]])
         ax.set_title(captions[frame], loc="left")
 
     show(0)

@@ -89,6 +89,16 @@ class Drawing:
         return tuple(mark for mark in self.marks if isinstance(mark, Dot))
 
     @property
+    def places(self) -> list[FramePoint]:
+        """Where joints and named points are, which no other name should cover."""
+        shown = [
+            mark
+            for mark in self.marks
+            if isinstance(mark, Pin | Span | Slider | Drive | Dot | Symbol)
+        ]
+        return [place for mark in shown for place, _ in reach(mark)]
+
+    @property
     def is_spatial(self) -> bool:
         """Whether its bodies move in space."""
         return self.dimension > PLANE

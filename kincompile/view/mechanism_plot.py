@@ -12,6 +12,7 @@ from kincompile.names import listed, suggestion
 from kincompile.report.picture import FILL
 from kincompile.runtime.results.columns import titled
 from kincompile.view.drawing import drawing
+from kincompile.view.labels import Name, around, box_of, leader, placed
 from kincompile.view.picture import colour_of
 from kincompile.view.polylines import polylines
 from kincompile.view.worlds import PLANE, PROJECTIONS, drawn_by
@@ -29,14 +30,18 @@ if TYPE_CHECKING:
     from kincompile.view.marks import FramePoint
     from kincompile.view.polylines import Polyline
 
+FONT, GAP, RADIUS = 8.3, 4.0, 5.0
+"""Height of names, their distance from what they name, and the room of a joint [points]."""
+
 NAME: dict[str, Any] = {
-    "xytext": (9, 9),
     "textcoords": "offset points",
-    "fontsize": "small",
+    "fontsize": FONT,
+    "ha": "center",
+    "va": "center",
     "zorder": 10,
     "bbox": {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1},
 }
-"""Style of the name of a joint: beside it, on a pale ground."""
+"""Style of the name of a joint, on a pale ground."""
 
 
 def plot_mechanism(
@@ -89,7 +94,7 @@ def plot_mechanism(
     labels = {dot.name: dot.place for dot in drawn.dots}
     if names:
         labels |= {joint.name: joint.place for joint in drawn.joints if joint.place is not None}
-    _write_names(ax, drawn.size, labels, position)
+    write_names(ax, drawn, _together(drawn.size, labels, position), position[None])
     return ax
 
 
@@ -204,14 +209,62 @@ def draw_in_plane(
     return move
 
 
-def write_name(ax: Axes, name: str, place: Sequence[float]) -> Callable[[Sequence[float]], None]:
-    """Write a name beside a place, and return what moves it to another."""
+def write_names(
+    ax: Axes, drawn: Drawing, labels: Mapping[str, FramePoint], q: NDArray[np.float64]
+) -> Callable[[NDArray[np.float64]], None]:
+    """Write names beside places at the first of positions q, shape (N, n); return what moves them.
+
+    They overlap least over all positions, and keep their ways from their places.
+    """
+    ax.apply_aspect()
+    if not labels:
+        return lambda position: None
+    page = 72 / ax.figure.dpi * np.asarray(ax.get_window_extent().get_points())
+    names = []
+    for name, place in labels.items():
+        box = box_of(name, FONT)
+        names.append(Name(_on_paper(ax, place.at(q)), box, around(box, GAP)))
+    joints = [_on_paper(ax, place.at(q)) for place in (*drawn.places, *labels.values())]
+    shifts = placed(names, np.stack(joints, axis=1), RADIUS, page)
+    moves = [
+        (_written(ax, name, place.at(q[0]), shift), place)
+        for (name, place), shift in zip(labels.items(), shifts, strict=True)
+    ]
+
+    def move(position: NDArray[np.float64]) -> None:
+        for put, place in moves:
+            put(place.at(position).tolist())
+
+    return move
+
+
+def _on_paper(ax: Axes, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return where points are, shape (N, 2) [points]; in space, as it is first seen."""
+    if points.shape[-1] > PLANE:
+        from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+        points = np.stack(proj_transform(*points.T, cast("Any", ax).get_proj())[:2], axis=-1)
+    return np.asarray(72 / ax.figure.dpi * ax.transData.transform(points))
+
+
+def _written(
+    ax: Axes, name: str, place: NDArray[np.float64], shift: NDArray[np.float64]
+) -> Callable[[Sequence[float]], None]:
+    """Write a name whose middle is beside a place [points]; return what moves it to another."""
     if len(place) > PLANE:
-        written = cast("Any", ax).text(*place, f"  {name}", fontsize="small", zorder=10)
+        from matplotlib.transforms import ScaledTranslation
+
+        way = ScaledTranslation(
+            shift[0] / 72, shift[1] / 72, cast("Any", ax.figure).dpi_scale_trans
+        )
+        style = {"fontsize": FONT, "ha": "center", "va": "center", "zorder": 10}
+        written = cast("Any", ax).text(*place, name, transform=ax.transData + way, **style)
         written.set_in_layout(False)
-        move: Callable[[Sequence[float]], None] = written.set_position_3d
-        return move
-    text = ax.annotate(name, (place[0], place[1]), **NAME)
+        put: Callable[[Sequence[float]], None] = written.set_position_3d
+        return put
+    line = leader(np.zeros(2), shift, box_of(name, FONT))
+    arrow = None if line is None else {"arrowstyle": "-", "linewidth": 0.6, "color": "0.4"}
+    text = ax.annotate(name, (place[0], place[1]), xytext=tuple(shift), arrowprops=arrow, **NAME)
     text.set_in_layout(False)  # a long name may leave the plot, but must not shrink it
 
     def moved(to: Sequence[float]) -> None:
@@ -233,14 +286,13 @@ def _artist(ax: Axes, polyline: Polyline, q: NDArray[np.float64], order: int) ->
     return line
 
 
-def _write_names(
-    ax: Axes, size: float, labels: Mapping[str, FramePoint], q: NDArray[np.float64]
-) -> None:
-    """Write names at their places; those of one place together."""
-    at: dict[tuple[float, ...], list[str]] = {}
+def _together(
+    size: float, labels: Mapping[str, FramePoint], q: NDArray[np.float64]
+) -> dict[str, FramePoint]:
+    """Return names with their places, those of one place together."""
+    at: dict[tuple[float, ...], dict[str, FramePoint]] = {}
     for name, place in labels.items():
         step = size * 1e-3
         corner = tuple(round(x / step) * step for x in place.at(q).tolist())
-        at.setdefault(corner, []).append(name)
-    for corner, names in at.items():
-        write_name(ax, ", ".join(names), corner)
+        at.setdefault(corner, {})[name] = place
+    return {", ".join(names): next(iter(names.values())) for names in at.values()}

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kincompile.report.picture import Picture, PictureLabel, PicturePath
+from kincompile.report.picture import INDEX, SYMBOL, Picture, PictureLabel, PicturePath
+from kincompile.view.labels import Name, around, box_of, leader, placed
 from kincompile.view.marks import GROUND_FRAME, moves_with
 from kincompile.view.polylines import Polyline, of_mark, pieces
 from kincompile.view.shapes import GROUND_COLOUR, HUES
@@ -37,11 +38,14 @@ MOST_FAINT = 12
 HEAD, THICK = 7.0, 1.4
 """Length of the head of a vector, and width of its line [points]."""
 
-ASIDE = 9.0
+GAP = 1.5
 """Distance of a label from its vector [points]."""
 
-ROOM = 17.0
-"""Distance that labels keep from each other where they can [points]."""
+RADIUS = 8.0
+"""Room around a pin that labels leave free [points]."""
+
+THIN = 0.6
+"""Width of the line from a label to its vector [points]."""
 
 ALONG = (0.5, 0.65, 0.35, 0.8, 0.2)
 """Where a label may stand beside its vector, in parts of it, the best place first."""
@@ -101,7 +105,7 @@ def picture_in_plane(
         for polyline in of_mark(mark, drawn.size)
         for path in _paths(polyline, q, scale, opacity_of(mark, shown))
     ]
-    pins = [scale.at(joint.place.at(q)) for joint in drawn.joints if joint.place is not None]
+    pins = [scale.at(place.at(q)) for place in drawn.places]
     return composed(title, scale, paths, zip(arrows, ends, strict=True), pins)
 
 
@@ -116,14 +120,28 @@ def composed(
 
     Labels keep away from pins, which are points of the picture.
     """
-    shown, labels, taken = list(paths), list[PictureLabel](), list(pins)
-    for arrow, ends in arrows:
-        start, end = scale.at(ends)
+    ways = [(arrow, scale.at(ends[0]), scale.at(ends[1])) for arrow, ends in arrows]
+    names = [Name(_named(*way)[None], size_of(way[0].name), _shifts(*way)) for way in ways]
+    drawn = [start + np.linspace(0, 1, 12)[:, None] * (end - start) for _, start, end in ways]
+    page = np.array(((0.0, 0.0), (scale.width, scale.height)))
+    joints, lines = np.reshape([*pins], (1, -1, 2)), np.reshape(drawn, (1, -1, 2))
+    shown, labels = list(paths), list[PictureLabel]()
+    shifts = placed(names, joints, RADIUS, page, lines)
+    for (arrow, start, end), name, shift in zip(ways, names, shifts, strict=True):
+        middle, colour = name.places[0] + shift, colour_of(arrow.frame)
+        line = leader(_nearest(start, end, middle), middle, name.size)
         shown += _arrow(arrow, start, end)
-        taken.append(_free(_places(arrow, start, end), taken))
-        x, y = taken[-1].tolist()
-        labels.append(PictureLabel(x, y, arrow.name, colour_of(arrow.frame), arrow.is_vector))
+        if line is not None:
+            shown.append(PicturePath(line, colour, "", THIN))
+        x, y = middle.tolist()
+        labels.append(PictureLabel(x, y, arrow.name, colour, arrow.is_vector))
     return Picture(title, scale.width, scale.height, tuple(shown), tuple(labels))
+
+
+def _nearest(start: Array, end: Array, point: Array) -> Array:
+    """Return the point of a line that is nearest to another point."""
+    length, along = _way(start, end)
+    return np.asarray(start + np.clip((point - start) @ along, 0, length) * along)
 
 
 class Scale:
@@ -187,22 +205,33 @@ def _way(start: Array, end: Array) -> tuple[float, Array]:
     return length, (end - start) / length if length > 1e-6 * WIDTH else np.array((1.0, 0.0))
 
 
-def _places(arrow: Arrow, start: Array, end: Array) -> list[Array]:
-    """Return where the label of a vector may stand; that of an axis is at its end.
+def _shifts(arrow: Arrow, start: Array, end: Array) -> Array:
+    """Return where the name of a vector may be from its middle; that of an axis is at its end.
 
     So is that of a direction in space, where six of them may begin at one point.
     """
     _, along = _way(start, end)
-    aside = ASIDE * np.array((-along[1], along[0]))
+    aside, size = np.array((-along[1], along[0])), size_of(arrow.name)
+
+    def beyond(way: Array) -> Array:
+        return way * (float(np.abs(way) @ size) / 2 + GAP)
+
+    sides = (beyond(aside), beyond(-aside))
     if not arrow.is_vector or (arrow.is_direction and len(arrow.start) > PLANE):
-        return [end + ASIDE * along, end + aside, end - aside, end + 2 * aside, end - 2 * aside]
-    return [start + part * (end - start) + side for part in ALONG for side in (aside, -aside)]
+        found = [end + shift for shift in (beyond(along), *sides)]
+    else:
+        found = [start + part * (end - start) + shift for part in ALONG for shift in sides]
+    anchor = _named(arrow, start, end)
+    return np.concatenate((np.stack(found) - anchor, around(size, GAP)))
 
 
-def _free(places: list[Array], taken: list[Array]) -> Array:
-    """Return the first place that is far enough from those that are taken, or the farthest."""
+def _named(arrow: Arrow, start: Array, end: Array) -> Array:
+    """Return the point of a vector that its name belongs to."""
+    return (start + end) / 2 if arrow.is_vector and not arrow.is_direction else end
 
-    def distance(place: Array) -> float:
-        return min([ROOM, *(float(np.hypot(*(place - item))) for item in taken)])
 
-    return max(places, key=distance)
+def size_of(name: str) -> Array:
+    """Return the size of a symbol, whose index is smaller, and which may have a prime."""
+    letter, _, index = name.partition("_")
+    wide = box_of(letter, SYMBOL)[0] + box_of(index, INDEX * SYMBOL)[0] + SYMBOL / 4
+    return np.array((wide, 1.2 * SYMBOL))

@@ -11,7 +11,7 @@ import numpy as np
 
 from kincompile.report.picture import FILL, PicturePath
 from kincompile.view.marks import GROUND_FRAME, Dot, Hull, Polygon, moves_with
-from kincompile.view.picture import ASIDE, MARGIN, Scale, colour_of, composed
+from kincompile.view.picture import GAP, MARGIN, Scale, colour_of, composed, size_of
 from kincompile.view.polylines import pieces
 from kincompile.view.shapes import HUES, INKS, mixed
 from kincompile.view.solids import Position, facets_of, solids
@@ -44,9 +44,6 @@ RIM = 0.6
 
 SEAM = 0.4
 """Width of the line in its own colour around a facet of a round solid, which closes seams."""
-
-LETTER = 6.0
-"""Width of a letter in the name of an axis [points]."""
 
 CIRCLE = np.stack([f(np.radians(np.arange(0, 360, 10))) for f in (np.cos, np.sin)], axis=-1)
 """A ball of radius one."""
@@ -82,12 +79,13 @@ def picture_in_space(
 ) -> Picture:
     """Draw a mechanism in space; `picture` says what is given."""
     ends = [ISOMETRIC.seen(np.stack((arrow.start, arrow.end)))[:, :2] for arrow in arrows]
-    seen = seen_paths(_about(drawn, focus) if focus else drawn, q, ISOMETRIC)
-    longest = max((len(arrow.name) for arrow in arrows), default=0)
-    margin = max(MARGIN, ASIDE + LETTER / 2 * longest)
+    about = _about(drawn, focus) if focus else drawn
+    seen = seen_paths(about, q, ISOMETRIC)
+    margin = max([MARGIN, *(GAP + size_of(arrow.name)[0] for arrow in arrows)])
     scale = Scale([*(path.points for path in seen), *ends], margin=margin)
     shown = (dataclasses.replace(path, points=scale.at(path.points)) for path in seen)
-    return composed(title, scale, shown, zip(arrows, ends, strict=True))
+    pins = [scale.at(ISOMETRIC.seen(place.at(q))[:2]) for place in about.places]
+    return composed(title, scale, shown, zip(arrows, ends, strict=True), pins)
 
 
 def _about(drawn: Drawing, focus: Iterable[BodyFrame]) -> Drawing:

@@ -11,21 +11,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kincompile.report.picture import svg_path
-from kincompile.report.svg import element, label
+from kincompile.report.svg import element
 from kincompile.view.picture import Scale
 from kincompile.view.shapes import INKS
 from kincompile.view.solid_picture import Camera, seen_paths, trace
-from kincompile.view.svg import HEIGHT, WIDTH, document
+from kincompile.view.svg import HEIGHT, WIDTH, document, names_beside
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from kincompile.view.drawing import Drawing
-    from kincompile.view.marks import Array
+    from kincompile.view.marks import Array, FramePoint
     from kincompile.view.svg import Timing
 
-NAME = 15
-"""Height of names [px]."""
+NAME, RIM = 15.0, 3.0
+"""Height of names, and width of the rim of paper around them [px]."""
 
 
 def svg_in_space(
@@ -44,16 +44,22 @@ def svg_in_space(
     traces = [camera.seen(path)[:, :2] for path in paths]
     scale = Scale([*(path.points for frame in frames for path in frame), *traces], (WIDTH, HEIGHT))
     lines = [path for k, points in enumerate(traces) for path in trace(k, scale.at(points))]
+    size, paper = (scale.width, scale.height), {"fill": INKS["paper"]}
+
+    def at(place: FramePoint, positions: Array = shown) -> Array:
+        x, y = scale.at(camera.seen(place.at(positions))[..., :2]).T
+        return np.stack((x, scale.height - y), axis=-1)
+
+    names = [*zip(drawn.dots, names_beside(drawn, at, NAME, size), strict=True)]
     pictures = [
         "\n".join(
             svg_path(path, scale.height)
             for path in (*(replace(item, points=scale.at(item.points)) for item in frame), *lines)
         )
-        + "".join(_name(dot.name, camera.seen(dot.place.at(row)), scale) for dot in drawn.dots)
+        + "".join(name.at(at(dot.place, row), RIM, _paint) for dot, name in names)
         for frame, row in zip(frames, shown, strict=True)
     ]
     moving = "".join(_frames(pictures, timing)) if timing and len(pictures) > 1 else ""
-    size, paper = (scale.width, scale.height), {"fill": INKS["paper"]}
     true_size = None if millimetres is None else millimetres / scale.factor
     heading = drawn.name, description
     return document(heading, size, NAME, paper, (pictures[0], moving), true_size=true_size)
@@ -76,13 +82,6 @@ def _frames(pictures: Sequence[str], timing: Timing) -> list[str]:
     ]
 
 
-def _name(name: str, seen: Array, scale: Scale) -> str:
-    """Return the element of a name, beside its point where there is room, on a rim of paper."""
-    place = scale.at(np.asarray(seen)[:2])
-    is_right = place[0] + NAME * len(name) < scale.width
-    x, y = place[0] + (NAME / 2 if is_right else -NAME / 2), scale.height - place[1] - NAME / 2
-    written = label(
-        name, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor="" if is_right else "end", fill=INKS["ink"],
-        stroke=INKS["paper"], stroke_width=3, paint_order="stroke",
-    )  # fmt: skip
-    return f"{written}\n"
+def _paint(stroke: str, fill: str) -> dict[str, str]:
+    """Return the attributes of colours by name, on white paper alone."""
+    return {"stroke": INKS.get(stroke, ""), "fill": INKS.get(fill, "none")}

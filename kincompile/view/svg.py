@@ -19,6 +19,7 @@ import numpy as np
 from kincompile.report.picture import DASHES, FILL
 from kincompile.report.svg import ROUND, element, label, outline
 from kincompile.report.templates import read
+from kincompile.view.labels import BASE, Name, around, box_of, leader, placed
 from kincompile.view.marks import GROUND_FRAME, moves_with
 from kincompile.view.polylines import Polyline, polylines
 from kincompile.view.shapes import HUES, mixed
@@ -28,13 +29,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from kincompile.view.drawing import Drawing
-    from kincompile.view.marks import Array
+    from kincompile.view.marks import Array, FramePoint
 
 WIDTH, HEIGHT = 960.0, 720.0
 """Largest sides of a picture [px]."""
 
 THICK = 8.0
 """Size of marks [px] beside which lines have the widths of their looks."""
+
+FONT = 1.4
+"""Height of names, in sizes of marks."""
 
 DOT = "dot"
 """The look of named points, which are drawn over paths."""
@@ -153,15 +157,17 @@ def svg_in_plane(
     unit = sheet.scale * drawn.size
     line = max(1.0, unit / THICK)
     traces = "".join(_trace(k, sheet.at(path), line) for k, path in enumerate(paths))
-    parts = traces.join(_layers(drawn, q[:1], sheet, line, {}))
+    frames = q if timing is not None else q[:1]
+    size, font = (sheet.width, sheet.height), FONT * unit
+    names = names_beside(drawn, lambda place: sheet.at(place.at(frames)), font, size)
+    parts = traces.join(_layers(drawn, q[:1], sheet, line, {}, names))
     moving = ""
     if timing is not None and len(q) > 1:
-        moving = traces.join(_layers(drawn, q, sheet, line, timing.attributes))
-    size = sheet.width, sheet.height
+        moving = traces.join(_layers(drawn, q, sheet, line, timing.attributes, names))
     true_size = None if millimetres is None else millimetres / sheet.scale
     paper = _paint("", "paper")
     heading = drawn.name, description
-    return document(heading, size, 1.4 * unit, paper, (parts, moving), _dark_rules(), true_size)
+    return document(heading, size, font, paper, (parts, moving), _dark_rules(), true_size)
 
 
 def document(
@@ -201,15 +207,20 @@ def document(
 
 
 def _layers(
-    drawn: Drawing, q: Array, sheet: _Sheet, line: float, clock: Mapping[str, str]
+    drawn: Drawing,
+    q: Array,
+    sheet: _Sheet,
+    line: float,
+    clock: Mapping[str, str],
+    names: Sequence[BesideDot],
 ) -> tuple[str, str]:
     """Return what is below the paths, and above them: the named points with their names."""
     strokes = _shown(drawn, q)
     below = [_stroke(item, q, sheet, line, clock) for item in strokes if item.stroke.look != DOT]
     above = [_stroke(item, q, sheet, line, clock) for item in strokes if item.stroke.look == DOT]
-    for dot in drawn.dots:
+    for dot, name in zip(drawn.dots, names, strict=True):
         motion = _Motion(sheet.at(dot.place.at(q)), None)
-        above.append((motion, _name(dot.name, np.zeros(2), line)))
+        above.append((motion, name.at(np.zeros(2), 2 * line, _paint)))
     return _together(below, clock), _together(above, clock)
 
 
@@ -301,11 +312,48 @@ def _trace(index: int, points: Array, line: float) -> str:
     )
 
 
-def _name(name: str, place: Array, line: float) -> str:
-    """Return the element of a name, beside its point, on a rim of paper."""
-    x, y = place[0] + 6 * line, place[1] - 6 * line
-    paint = _paint("paper", "ink") | {"stroke_width": _number(2 * line), "paint_order": "stroke"}
-    return label(name, x=_number(x), y=_number(y), **paint) + "\n"
+@dataclass(frozen=True, slots=True)
+class BesideDot:
+    """The name of a point, and the way from the point to its middle [px], y downwards."""
+
+    name: str
+    shift: Array
+    font: float
+
+    def at(self, place: Array, rim: float, paint: Callable[[str, str], Mapping[str, str]]) -> str:
+        """Return its elements, on a rim of paper of a width, and where it is far a leader line.
+
+        `paint` returns the attributes of a stroke and a fill.
+        """
+        middle = place + self.shift
+        line = leader(place, middle, box_of(self.name, self.font))
+        led = ""
+        if line is not None:
+            shape, width = outline(line.tolist(), False, _pair), _number(rim / 3)
+            led = element("path", d=shape, **paint("ink", ""), stroke_width=width) + "\n"
+        x, y = map(_number, (middle[0], middle[1] + BASE * self.font))
+        colours = paint("paper", "ink")
+        stroke = {"stroke_width": _number(rim), "paint_order": "stroke"}
+        written = label(self.name, x=x, y=y, text_anchor="middle", **colours, **stroke)
+        return f"{led}{written}\n"
+
+
+def names_beside(
+    drawn: Drawing, seen: Callable[[FramePoint], Array], font: float, size: tuple[float, float]
+) -> list[BesideDot]:
+    """Return the names of points on a picture of a size, away from joints and from each other.
+
+    `seen` returns where a place is in each frame, shape (F, 2) [px], y downwards.
+    """
+    names = []
+    for dot in drawn.dots:
+        box = box_of(dot.name, font)
+        names.append(Name(seen(dot.place), box, around(box, font / 4) * (1, -1)))
+    if not names:
+        return []
+    joints = np.stack([seen(place) for place in drawn.places], axis=1)
+    shifts = placed(names, joints, font / 4, np.array(((0.0, 0.0), size)))
+    return [BesideDot(dot.name, way, font) for dot, way in zip(drawn.dots, shifts, strict=True)]
 
 
 def _transform(kind: str, additive: str, values: Iterable[str], clock: Mapping[str, str]) -> str:

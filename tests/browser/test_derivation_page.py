@@ -1,5 +1,6 @@
 """Derivation pages in headless Chromium: no overflow, no missing glyph, no network, no message."""
 
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -29,6 +30,10 @@ EMPTY_MATH = """() => [...document.querySelectorAll('main math')]
   .filter(math => math.closest('details:not([open])') === null)
   .filter(math => math.getBoundingClientRect().width * math.getBoundingClientRect().height === 0)
   .map(math => math.outerHTML.slice(0, 120))"""
+
+SIDES = """tags => [...document.querySelectorAll(`main :is(${tags})`)]
+  .map(element => element.getBoundingClientRect())
+  .map(box => [box.left, box.right, box.top, box.bottom])"""
 
 # Is the numerator of every fraction above its denominator? Only where MathML is laid out.
 FLAT_FRACTIONS = """() => [...document.querySelectorAll('main mfrac')]
@@ -99,6 +104,21 @@ def test_that_nothing_is_wider_than_the_page(open_page: Any, name: str, width: i
     page = open_page(name, width)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.evaluate(TOO_WIDE) == []
+    page.close()
+
+
+@pytest.mark.parametrize("width", [1920, *WIDTHS])
+def test_that_figures_are_in_the_margin_where_there_is_room(open_page: Any, width: int) -> None:
+    page = open_page("wrecker_boom", width)
+    page.evaluate("document.querySelectorAll('details').forEach(item => { item.open = true; })")
+    figures, texts = (page.evaluate(SIDES, tags) for tags in ("figure", "p, h2, h3, h4, .eq"))
+    assert len(figures) > 5
+    end = max(right for _, right, *_ in texts)
+    assert {left >= end for left, *_ in figures} == {width == 1920}
+    assert max(right for _, right, *_ in figures) <= width
+    below = sorted(figures, key=lambda item: item[2])
+    assert all(one[3] <= other[2] for one, other in itertools.pairwise(below))
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
     page.close()
 
 

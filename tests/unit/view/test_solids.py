@@ -247,8 +247,9 @@ def test_that_a_drawing_has_its_true_size_in_a_standard_view(motion, drawn, tmp_
     root: Any = ET.parse(path).getroot()
     left, top, wide, tall = map(float, root.get("viewBox").split())
     pixel = float(root.get("width").removesuffix("mm")) / wide / 1000
-    (name,) = root.findall(f"{SVG}text")
-    x, y = float(name.get("x")) - 7.5, float(name.get("y")) + 7.5
+    assert [name.text for name in root.findall(f"{SVG}text")] == ["tip"]
+    (traced,) = (path for path in root.iter(f"{SVG}path") if path.get("stroke-width") == "1.5")
+    x, y = map(float, traced.get("d").strip("M").split("L")[0].split())
     tip = np.array([motion[f"{axis}_tip"][0] for axis in "xyz"])[axes]
     block = motion.q[0, 14:17][axes]
     corners = [
