@@ -12,7 +12,7 @@ from kincompile.names import listed, suggestion
 from kincompile.report.picture import FILL
 from kincompile.runtime.results.columns import titled
 from kincompile.view.drawing import drawing
-from kincompile.view.labels import Name, around, box_of, leader, placed
+from kincompile.view.labels import SIDES, Name, around, box_of, leader, placed
 from kincompile.view.picture import colour_of
 from kincompile.view.polylines import polylines
 from kincompile.view.worlds import PLANE, PROJECTIONS, drawn_by
@@ -223,12 +223,15 @@ def write_names(
     names = []
     for name, place in labels.items():
         box = box_of(name, FONT)
-        names.append(Name(_on_paper(ax, place.at(q)), box, around(box, GAP)))
+        shifts = around(box, GAP)
+        if drawn.is_spatial:  # where a view that turns has no leader lines
+            shifts = shifts[: 2 * len(SIDES)]
+        names.append(Name(_on_paper(ax, place.at(q)), box, shifts))
     joints = [_on_paper(ax, place.at(q)) for place in (*drawn.places, *labels.values())]
-    shifts = placed(names, np.stack(joints, axis=1), RADIUS, page)
+    found = placed(names, np.stack(joints, axis=1), RADIUS, page)
     moves = [
         (_written(ax, name, place.at(q[0]), shift), place)
-        for (name, place), shift in zip(labels.items(), shifts, strict=True)
+        for (name, place), shift in zip(labels.items(), found, strict=True)
     ]
 
     def move(position: NDArray[np.float64]) -> None:

@@ -336,6 +336,10 @@ def test_matplotlib_in_three_dimensions(motion, tmp_path):
         texts["tip"], [motion[f"{axis}_tip"][5] for axis in "xyz"], atol=1e-5
     )
     ax.figure.canvas.draw()
+    for text in ax.texts:  # beside its place, since nothing leads there
+        box = np.array(text.get_window_extent().get_points())
+        place = ax.transData.transform(text.get_position())
+        assert np.hypot(*(place - np.clip(place, *box))) < 20
     assert kc.animate(motion, tmp_path / "a.gif", seconds=0.2).stat().st_size > 5000
     _, flat = plt.subplots()
     with pytest.raises(InputError, match='give axes made with projection="3d"'):
