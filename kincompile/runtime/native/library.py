@@ -78,11 +78,12 @@ KINEMATICS = Part(FULL, ("-D_WITHOUT_SETS", "-D_ONLY_KINEMATICS"))
 SETS = Part(FULL, ("-D_WITHOUT_ONE",))
 """What many parameter sets need: built on request."""
 
-LARGEST_IN_FULL, LARGEST_VECTORIZED = 302_000, 1_200_000
-"""Characters of source up to which it is optimized in full, and up to which loops over points take
-several at once. An angle's cosine and sine, which are written in line, count as ANGLE. gcc combines
-instructions in time that grows with the square of a function's length: a Delta robot takes 2 s, a
-platform of 91 coordinates 10 s, and 5 s where points are taken one by one, at half the speed."""
+LARGEST_AT_ONCE, LARGEST_VECTORIZED = 302_000, 1_200_000
+"""Characters of source up to which loops over points take several at once: in the library that a
+first motion waits for, and in those that are built on request. An angle's cosine and sine, which
+are written in line, count as ANGLE. gcc combines instructions in time that grows with the square of
+a function's length: it takes 1.4 s for a Delta robot, and half of that where points are taken one
+by one, at half the speed; for a platform of 91 coordinates 10 s and 5 s."""
 ANGLE = 3_000
 
 LONGEST_OPTIMIZED = 400_000
@@ -170,9 +171,9 @@ def _level(source: str, wanted: tuple[str, ...]) -> tuple[str, ...]:
     if max(map(len, source.split("\n}\n"))) > LONGEST_OPTIMIZED:
         return ("-O0",)
     size = len(source) + ANGLE * source.count("cos_sin(")
-    if size > LARGEST_VECTORIZED:
-        return ("-O1",)
-    return QUICK if wanted == FULL and size > LARGEST_IN_FULL else wanted
+    if size <= LARGEST_AT_ONCE:
+        return wanted
+    return QUICK if wanted == FULL and size <= LARGEST_VECTORIZED else ("-O1",)
 
 
 def _compiler() -> tuple[str, ...]:

@@ -177,7 +177,7 @@ def test_arguments_beside_the_name_reach_the_compiler(monkeypatch, compiler, cac
 
 
 @pytest.mark.parametrize(
-    ("limit", "level"), [("LARGEST_VECTORIZED", "-O1"), ("LONGEST_OPTIMIZED", "-O0")]
+    ("limit", "level"), [("LARGEST_AT_ONCE", "-O1"), ("LONGEST_OPTIMIZED", "-O0")]
 )
 def test_large_sources_are_not_optimized_for_minutes(
     monkeypatch, compiler, cache, tmp_path, limit, level
@@ -188,13 +188,16 @@ def test_large_sources_are_not_optimized_for_minutes(
     assert (tmp_path / "seen").read_text() == f"{level}\n"
 
 
-@pytest.mark.parametrize(("limit", "level"), [(10**6, "-O3"), (1000, "-O2")])
+@pytest.mark.parametrize(
+    ("limits", "level"), [((10**6, 10**6), "-O3"), ((1000, 10**6), "-O2"), ((1000, 1000), "-O1")]
+)
 def test_that_what_is_built_on_request_is_optimized_by_its_size(
-    monkeypatch, compiler, cache, tmp_path, limit, level
+    monkeypatch, compiler, cache, tmp_path, limits, level
 ):
     module = kc.compile(tiny(), target="c")
     compiler(f'echo "$1" > {tmp_path}/seen; exec REAL "$@"')
-    monkeypatch.setattr(c_library, "LARGEST_IN_FULL", limit)
+    for name, limit in zip(("LARGEST_AT_ONCE", "LARGEST_VECTORIZED"), limits, strict=True):
+        monkeypatch.setattr(c_library, name, limit)
     module.kinematics(module.GUESS, 0 * module.GUESS, 0.5)
     assert (tmp_path / "seen").read_text() == f"{level}\n"
 
