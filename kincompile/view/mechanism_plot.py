@@ -161,6 +161,10 @@ def checked_parameters(
     return dict(p or {})
 
 
+MOST_SHIFTS = {2: None, 3: 2 * len(SIDES)}
+"""Places of a name that are compared, by dimension: a view that turns has no leader lines."""
+
+
 def axes_of(figure: Figure, drawn: Drawing) -> Axes:
     """Return the axes of a new figure, those of space where the mechanism moves there."""
     return figure.add_subplot(projection=PROJECTIONS[drawn.dimension])
@@ -223,9 +227,7 @@ def write_names(
     names = []
     for name, place in labels.items():
         box = box_of(name, FONT)
-        shifts = around(box, GAP)
-        if drawn.is_spatial:  # where a view that turns has no leader lines
-            shifts = shifts[: 2 * len(SIDES)]
+        shifts = around(box, GAP)[: MOST_SHIFTS[drawn.dimension]]
         names.append(Name(_on_paper(ax, place.at(q)), box, shifts))
     joints = [_on_paper(ax, place.at(q)) for place in (*drawn.places, *labels.values())]
     found = placed(names, np.stack(joints, axis=1), RADIUS, page)
@@ -243,11 +245,21 @@ def write_names(
 
 def _on_paper(ax: Axes, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return where points are, shape (N, 2) [points]; in space, as it is first seen."""
-    if points.shape[-1] > PLANE:
-        from mpl_toolkits.mplot3d.proj3d import proj_transform
+    seen = SEEN[points.shape[-1]](ax, points)
+    return np.asarray(72 / ax.figure.dpi * ax.transData.transform(seen))
 
-        points = np.stack(proj_transform(*points.T, cast("Any", ax).get_proj())[:2], axis=-1)
-    return np.asarray(72 / ax.figure.dpi * ax.transData.transform(points))
+
+def _projected(ax: Any, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points of space as axes show them, shape (N, 2)."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    return np.stack(proj_transform(*points.T, ax.get_proj())[:2], axis=-1)
+
+
+SEEN: dict[int, Callable[[Any, NDArray[np.float64]], NDArray[np.float64]]] = {
+    2: lambda _, points: points, 3: _projected,
+}  # fmt: skip
+"""Points as axes show them, by their components."""
 
 
 def _written(
