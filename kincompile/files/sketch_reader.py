@@ -47,20 +47,17 @@ class SketchReader(FieldReader):
         self, name: str, options: Row, parameters: Sequence[Parameter], given: Any
     ) -> Mechanism:
         """Return what a drawing makes; as far as it is good an empty mechanism."""
-        known = fields_of("sketch", self.words.count)
-        given_live = given.get("live") if isinstance(given, dict) else None
-        live = (
-            None
-            if given_live is None
-            else self.value(given_live, known["live"].schema, (*PLACE, "live"))
-        )
-        sketch: Any = self.words.sketch()(name, live=live, **options)
-        for item in parameters:
-            sketch.parameter(item.name, item.default, item.unit, item.range)
         if not isinstance(given, dict):
             self.problem(PLACE, f"expected a table, not {shown(given)}")
             return self.words.mechanism(name)
+        known = fields_of("sketch", self.words.count)
         self.has_fields(PLACE, given, known)
+        live = given.get("live")
+        if live is not None:
+            live = self.value(live, known["live"].schema, (*PLACE, "live"))
+        sketch: Any = self.words.sketch()(name, live=live, **options)
+        for item in parameters:
+            sketch.parameter(item.name, item.default, item.unit, item.range)
         for key, address, value in self._named(given, "lengths"):
             sketch.length(key, self.number(value, address))
             self.names[key] = sympy.Symbol(key)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -99,13 +100,7 @@ def limits_left(
 
 def placements(coordinates: Array) -> Array:
     """Return placements (N, 4, 4) of a body by its coordinates (N, 7)."""
-    r, p = coordinates[:, :3], coordinates[:, 3:]
-    e0, e = p[:, :1, None], p[:, 1:]
-    square = (p * p).sum(axis=1)[:, None, None]
-    x, y, z = e.T
-    zero = np.zeros_like(x)
-    across = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    made = np.broadcast_to(np.eye(4), (len(r), 4, 4)).copy()
-    made[:, :3, :3] += 2 * (e0 * across + across @ across) / square
-    made[:, :3, 3] = r
+    made = np.broadcast_to(np.eye(4), (len(coordinates), 4, 4)).copy()
+    made[:, :3, :3] = Rotation.from_quat(np.roll(coordinates[:, 3:], -1, axis=1)).as_matrix()
+    made[:, :3, 3] = coordinates[:, :3]
     return made

@@ -3,6 +3,7 @@
 import { addCylinder, addDriver, addGear, addJoint, addLink, addSlider, addSlot, erase, erasePart, extendLink, kindOf, moveJoint, nameOf, newFile, sketchOf, toggleGround, togglePoint } from './edits.js';
 import { Board, connectPointers } from './board.js';
 import { Editing } from './editing.js';
+import { save } from './save.js';
 import { FormulaError } from './formula.js';
 import { ModelProblem } from './sketched.js';
 import { FileError, readToml, writeToml } from './toml.js';
@@ -335,12 +336,8 @@ function announce(text) {
 
 /* ---- files ---- */
 
-function save(text, ending) {
-  const link = made('a');
-  link.href = URL.createObjectURL(new Blob([text], { type: 'text/plain' }));
-  link.download = `${String(editing.file.name ?? 'drawing').replace(/\W+/g, '_')}.${ending}`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+function saveText(text, ending) {
+  save(`${String(editing.file.name ?? 'drawing').replace(/\W+/g, '_')}.${ending}`, new Blob([text], { type: 'text/plain' }));
 }
 
 function openText(text) {
@@ -468,8 +465,8 @@ function start() {
       fit();
       editor.show();
     },
-    open: () => part('file').click(), toml: () => save(writeToml(editing.file), 'toml'),
-    python: () => editor.change(() => save(writePython(editing.file), 'py')),
+    open: () => part('file').click(), toml: () => saveText(writeToml(editing.file), 'toml'),
+    python: () => editor.change(() => saveText(writePython(editing.file), 'py')),
     undo: () => undo('undo'), redo: () => undo('redo'), play: () => editor.play(!editor.isPlaying), fit, assemblies: nextAssembly,
     theme: () => {
       document.documentElement.dataset.theme = board.palette.isDark ? 'light' : 'dark';

@@ -6,6 +6,7 @@ import { multiples, niceStep, ROUNDING_PART, stepText, symbolText, units } from 
 import { liveliestOf } from '#world';
 import { hasMotion, isProjected, stage } from './stage.js';
 import { buttonOf, byId, setAttributes, svgElement } from './elements.js';
+import { save } from './save.js';
 import { columns, failures, plottedFirst } from './columns.js';
 import { contains, findBox } from './tables.js';
 import { settings } from './settings.js';
@@ -373,14 +374,6 @@ function optionGroup(group) {
   element.label = group.title;
   element.append(...group.items.map(({ label, title }) => new Option(title, label)));
   return element;
-}
-
-/* Give a file to the browser, which asks the user or keeps it among the downloads. */
-export function save(name, blob) {
-  const link = document.createElement('a');
-  Object.assign(link, { href: URL.createObjectURL(blob), download: name });
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
 /* An SVG as pixels, twice as many as are seen. */
