@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 MODULES = (
     "draw.js", "plane.js", "formula.js", "toml.js", "sketched.js", "sparse.js", "bound.js",
-    "edits.js", "editing.js", "model_marks.js", "python_text.js", "board.js", "save.js",
-    "editor.js",
+    "edits.js", "editing.js", "model_marks.js", "python_text.js", "board.js", "save.js", "editor.js",
 )  # fmt: skip
 """The modules of the editor, in order; of those of the page it has what draws marks."""
 
