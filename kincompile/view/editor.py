@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from kincompile.model.system import ConstraintSystem
 
 MODULES = (
-    "draw.js", "plane.js", "formula.js", "toml.js", "sketched.js", "sparse.js", "bound.js", "edits.js",
-    "editing.js", "model_marks.js", "python_text.js", "board.js", "save.js", "editor.js",
+    "draw.js", "plane.js", "formula.js", "toml.js", "sketched.js", "sparse.js", "bound.js",
+    "edits.js", "editing.js", "model_marks.js", "python_text.js", "board.js", "save.js",
+    "editor.js",
 )  # fmt: skip
 """The modules of the editor, in order; of those of the page it has what draws marks."""
 
