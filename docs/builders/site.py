@@ -12,9 +12,12 @@ from pathlib import PurePosixPath
 from posixpath import normpath
 from typing import TYPE_CHECKING
 
+import click
+
 import kincompile as kc
 from docs.builders import benchmark_plots, lessons, pictures
 from docs.builders.places import DOCS, EXAMPLES, ROOT, write
+from kincompile.cli import cli
 from kincompile.model.catalogue import CONSTRAINTS
 from kincompile.names import title_of
 from kincompile.space.catalogue import CONSTRAINTS as IN_SPACE
@@ -110,8 +113,22 @@ def _read(app: Sphinx, name: str, source: list[str]) -> None:
     source[0] = lessons.LIVE.sub(lambda match: _live(own or match[1], top), source[0])
     if name == "names":
         source[0] = _with_links(source[0]) + _toctree("made/api/*")
+    if name == "command_line":
+        source[0] += _options()
     if name == "guides":
         source[0] = source[0].replace("emitted_modules\n```", f"emitted_modules\n{_others()}```")
+
+
+def _options() -> str:
+    """Return what `kincompile COMMAND --help` prints, of every command."""
+    context = click.Context(cli, info_name="kincompile", terminal_width=100)
+    parts = []
+    for name in cli.list_commands(context):
+        command = cli.get_command(context, name)
+        assert command is not None
+        printed = command.get_help(click.Context(command, context, name))
+        parts.append(f"\n### kincompile {name}\n\n```text\n{printed}\n```\n")
+    return "\n## Every option\n" + "".join(parts)
 
 
 def _others() -> str:
