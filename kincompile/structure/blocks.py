@@ -153,11 +153,8 @@ def components(heads: Index, tails: Index, count: int) -> Index:
 def _matrix(rows: Index, columns: Index, shape: tuple[int, int]) -> object:
     from scipy.sparse import csr_array
 
-    places = (
-        rows.astype(np.int32),
-        columns.astype(np.int32),
-    )  # all that csgraph took before SciPy 1.15
-    return csr_array((np.ones(rows.size), places), shape=shape)
+    short = np.array([rows, columns], np.int32)  # csgraph took no others before SciPy 1.15
+    return csr_array((np.ones(rows.size), tuple(short)), shape=shape)
 
 
 def order_of_solution(needs: Index, labels: Iterable[int]) -> list[int]:

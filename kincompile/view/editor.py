@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from kincompile.report.templates import fill, read
 from kincompile.runtime.singular.events import SENTENCES
 from kincompile.view.modules import joined
 from kincompile.view.page import FRAME_HEIGHT, write_html
+from kincompile.view.page_data import as_json
 from kincompile.view.shapes import tables
 
 if TYPE_CHECKING:
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 MODULES = (
     "draw.js", "plane.js", "formula.js", "toml.js", "sketched.js", "sparse.js", "bound.js",
-    "edits.js", "editing.js", "model_marks.js", "python_text.js", "board.js", "save.js",
-    "editor.js",
+    "edits.js", "history.js", "editing.js", "model_marks.js", "python_text.js", "board.js",
+    "save.js", "editor.js",
 )  # fmt: skip
 """The modules of the editor, in order; of those of the page it has what draws marks."""
 
@@ -86,7 +86,7 @@ def editor(
     slots = {
         "title": "kincompile editor",
         "style": read("view/style.css") + read("view/editor.css"),
-        "data": json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
+        "data": as_json(data),
         "scripts": [kernels_script(), joined(MODULES)],
     }
     return Editor(fill("view/editor.html.jinja", slots))

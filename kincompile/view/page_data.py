@@ -137,7 +137,7 @@ def as_json(data: Mapping[str, Any]) -> str:
 
     Arrays become base64 of their little-endian float64, row by row.
     """
-    arrays = {name: _encoded(array) for name, array in data["arrays"].items()}
+    arrays = {name: _encoded(array) for name, array in data.get("arrays", {}).items()}
     text = json.dumps({**data, "arrays": arrays}, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
 

@@ -3,21 +3,23 @@
 import { Bound, structureOf } from './bound.js';
 import { FormulaError } from './formula.js';
 import { newFile } from './edits.js';
+import { History } from './history.js';
 import { isDriver, ModelProblem, modelOf } from './sketched.js';
 import { FileError, readToml } from './toml.js';
 
-const MOST_UNDONE = 200;  // edits that can be taken back
 const MOST_COORDINATES = 150;  // as a page
 const TRIES = 48;  // starts from which other assemblies are looked for
 const SAME_ASSEMBLY = 1e-6;  // of a scale, up to which two positions are one
 
 export class Editing {
   constructor(file = newFile()) {
-    this.past = [];
-    this.future = [];
     /** @type {Object<string, string>} */
     this.sentences = {};  // of events
     this.open(file);
+    this.history = new History(() => JSON.stringify(this.file), text => {
+      this.file = plain(JSON.parse(text));
+      this.refresh();
+    });
   }
 
   /** Take a file as text; a mistake leaves what was there. @param {string} text */
@@ -26,8 +28,14 @@ export class Editing {
     if (file.kincompile !== 1) throw new FileError('The file is no model of kincompile. Open one that begins with "kincompile = 1".');
     const model = modelOf(file);
     if (3 * model.bodies.length > MOST_COORDINATES) throw new FileError(`The model has ${model.bodies.length} bodies. Open one of at most ${MOST_COORDINATES / 3}.`);
-    this.remember();
+    this.replace(file);
+  }
+
+  /* Take another file: a step of undo. */
+  replace(file) {
+    this.history.take();
     this.open(file);
+    this.history.take();
   }
 
   open(file) {
@@ -36,17 +44,11 @@ export class Editing {
     this.refresh();
   }
 
-  /* Keep the file as it is, for undo. */
-  remember() {
-    this.past.push(JSON.stringify(this.file));
-    this.past.splice(0, this.past.length - MOST_UNDONE);
-    this.future = [];
-  }
-
-  /** Change the file; a step of undo unless it continues the last one.
+  /** Change the file; a step of undo unless it goes on, as a pull does until it is let go.
    * @param {(file: any) => any} edit @param {{ goesOn?: boolean }} [how] */
   edit(edit, { goesOn = false } = {}) {
     const before = JSON.stringify(this.file);
+    if (!goesOn) this.history.take();
     let said;
     try {
       said = edit(this.file);
@@ -55,28 +57,9 @@ export class Editing {
       this.refresh();
       throw error;
     }
-    if (!goesOn && JSON.stringify(this.file) !== before) {
-      this.past.push(before);
-      this.past.splice(0, this.past.length - MOST_UNDONE);
-      this.future = [];
-    }
     this.refresh();
+    if (!goesOn) this.history.take();
     return said;
-  }
-
-  undo() {
-    this.swap(this.past, this.future);
-  }
-
-  redo() {
-    this.swap(this.future, this.past);
-  }
-
-  swap(from, to) {
-    if (!from.length) return;
-    to.push(JSON.stringify(this.file));
-    this.file = plain(JSON.parse(from.pop()));
-    this.refresh();
   }
 
   /* Find what the file means, and solve it. */

@@ -136,7 +136,7 @@ const editor = {
     if (!editing.model.joints.has(joint)) return;
     this.rewind();
     board.held = joint;
-    editing.remember();
+    editing.history.take();
     this.bring(joint, null);
   },
 
@@ -151,7 +151,7 @@ const editor = {
   letGo() {
     if (!board.held) return;
     board.held = null;
-    if (editing.past[editing.past.length - 1] === JSON.stringify(editing.file)) editing.past.pop();
+    editing.history.take();
     this.show();
   },
 
@@ -187,8 +187,8 @@ const editor = {
     const { isGood, lines } = editing.findings(), { motion } = editing;
     part('findings').replaceChildren(...lines.map(text => made('li', text)));
     part('findings').classList.toggle('bad', !isGood && Boolean(editing.problem || editing.event));
-    part('undo').disabled = !editing.past.length;
-    part('redo').disabled = !editing.future.length;
+    part('undo').disabled = !editing.history.canUndo;
+    part('redo').disabled = !editing.history.canRedo;
     part('time').max = String((motion?.t.length ?? 1) - 1);
     part('play').disabled = !motion || motion.failed?.index === 0;
     if (!isPull) this.list();
@@ -378,7 +378,7 @@ function onBoard(event) {
   } else if (key === 'Escape') {
     const { held } = board;
     if (held) {
-      undo('undo');
+      if (editing.history.isChanged) undo('undo');
       board.cursor = board.jointPlaces().get(held);
     }
     board.first = board.held = null;
@@ -410,7 +410,7 @@ function onPage(event) {
 
 function undo(which) {
   board.held = board.first = null;
-  editing[which]();
+  editing.history[which]();
   board.renew();
   editor.show();
 }
@@ -459,8 +459,7 @@ function start() {
   });
   const acts = {
     new: () => {
-      editing.remember();
-      editing.open(newFile());
+      editing.replace(newFile());
       board.renew();
       fit();
       editor.show();
@@ -502,7 +501,7 @@ function start() {
   }).observe(part('canvas').parentElement);
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', acts.theme);
   if (given.file) openText(given.file);
-  editing.past = [];
+  editing.history.forget();
   editor.take(given.file ? 'move' : 'link');
   editor.show();
 }

@@ -3,25 +3,35 @@
    new History(now, show)   now() gives a copy of the present value, show(value) goes back to one
    take()           a step was made: what was undone before is dropped
    undo(), redo()
+   forget()         what is there now is where it begins
    onChange         called when there is more or less to undo */
+
+const MOST = 200;  // steps that are kept
 
 export class History {
   constructor(now, show) {
     this.now = now;
-    this.steps = [now()];
-    this.at = 0;
     this.show = show;
     this.onChange = () => {};
+    this.forget();
+  }
+
+  forget() {
+    this.steps = [this.now()];
+    this.go(0);
   }
 
   get canUndo() { return this.at > 0; }
   get canRedo() { return this.at + 1 < this.steps.length; }
 
+  /* What is there now is no step yet. */
+  get isChanged() { return !isSame(this.now(), this.steps[this.at]); }
+
   take() {
+    if (!this.isChanged) return;
     const value = this.now();
-    if (isSame(value, this.steps[this.at])) return;
-    this.steps = [...this.steps.slice(0, this.at + 1), value];
-    this.go(this.at + 1);
+    this.steps = [...this.steps.slice(0, this.at + 1), value].slice(-MOST - 1);
+    this.go(this.steps.length - 1);
   }
 
   undo() {
