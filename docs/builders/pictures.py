@@ -11,6 +11,7 @@ import matplotlib as mpl
 import numpy as np
 
 import kincompile as kc
+from docs.builders.badges import badges
 from docs.builders.places import EXAMPLES
 from docs.builders.space import joints_in_space
 
@@ -37,7 +38,7 @@ def drawn() -> dict[str, str]:
     """Return the pictures of the README, and of joints in space, by the name of their file."""
     moved = {f"{name}.svg": moving(name) for name in THUMBNAILS}
     stands = {f"{name}.svg": still(name) for name in STILL}
-    return {**moved, **stands, "joints_in_space.svg": joints_in_space()}
+    return {**moved, **stands, "joints_in_space.svg": joints_in_space(), "badges.svg": badges()}
 
 
 def moving(name: str) -> str:

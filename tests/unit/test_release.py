@@ -27,6 +27,16 @@ def test_that_there_is_one_version():
     assert released[:1] == [kc.__version__]
 
 
+def test_that_badges_say_what_is_tested():
+    said = re.findall(r">([^<>]+)</text>", text("docs/images/badges.svg"))
+    tested = re.findall(
+        r'"(3\.\d+)"', text(".ci/matrix.py").partition("PYTHONS")[2].partition("\n")[0]
+    )
+    assert said == ["kincompile", kc.__version__, "Python", " | ".join(tested), "license", "MIT"]
+    (shown,) = re.findall(r'badges.svg" alt="(.*?)"', text("README.md"))
+    assert shown == f"Version {kc.__version__}; Python {', '.join(tested)}; license MIT"
+
+
 def test_that_the_conda_recipe_has_the_version_and_the_dependencies():
     recipe = text("conda.recipe/recipe.yaml")
     assert f'version: "{kc.__version__}"' in recipe
