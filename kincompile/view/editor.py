@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from kincompile.emitters.javascript.kernels import kernels_script
+from kincompile.errors import ModelError
 from kincompile.files.files import read_model
 from kincompile.html import framed_html
+from kincompile.model.mechanism import Mechanism
 from kincompile.report.templates import fill, read
 from kincompile.runtime.singular.events import SENTENCES
 from kincompile.view.modules import joined
@@ -18,7 +20,6 @@ from kincompile.view.page_data import as_json
 from kincompile.view.shapes import tables
 
 if TYPE_CHECKING:
-    from kincompile.model.mechanism import Mechanism
     from kincompile.model.system import ConstraintSystem
 
 MODULES = (
@@ -96,8 +97,13 @@ def _text_of(model: Mechanism | ConstraintSystem | str | os.PathLike[str] | None
     """Return a model as the text of a file: as it is written, where it is one."""
     if model is None:
         return ""
-    if not isinstance(model, str | os.PathLike):
-        return model.to_toml()
-    written = read_model(model)
-    path = Path(model)
-    return path.read_text("utf-8") if path.suffix in (".toml", ".json") else written.to_toml()
+    if isinstance(model, str | os.PathLike):
+        path, read = Path(model), read_model(model)
+    else:
+        path, read = Path(), model
+    if type(read) is not Mechanism:
+        raise ModelError(
+            f"{read.name} is no mechanism in the plane: the editor draws no other. Show it in "
+            "motion with `kincompile view`, or kc.page."
+        )
+    return path.read_text("utf-8") if path.suffix in (".toml", ".json") else read.to_toml()

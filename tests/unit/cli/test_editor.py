@@ -1,10 +1,14 @@
 """`kincompile editor`: an empty page, a page with a model, and what is refused."""
 
+from pathlib import Path
+
 import pytest
 from click.testing import CliRunner
 
 import kincompile as kc
 from kincompile.cli import cli
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 
 
 def said(arguments):
@@ -36,3 +40,12 @@ def test_that_a_model_is_not_written_over(pendulum):
     before = pendulum.read_text(encoding="utf-8")
     assert said([pendulum, "-o", pendulum])[0] == 2
     assert pendulum.read_text(encoding="utf-8") == before
+
+
+@pytest.mark.parametrize("name", ["space/rssr", "example_3_7_5"])
+def test_that_what_is_not_in_the_plane_is_refused(name, tmp_path):
+    code, message = said([EXAMPLES / f"{name}.toml", "-o", tmp_path / "page.html"])
+    assert code == 2
+    assert "is no mechanism in the plane" in message
+    assert "kincompile view" in message
+    assert not (tmp_path / "page.html").exists()
