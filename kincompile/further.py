@@ -95,17 +95,10 @@ def _joints(system: ConstraintSystem) -> dict[str, tuple[str, ...]]:
 
 
 def _limits(system: ConstraintSystem) -> Callable[..., Any]:
-    """Return what says which limits of joints are left."""
-    from kincompile.space.limits import limits_left
+    """Return what says which limits of joints are left; made where one is solved first."""
+    from kincompile.ir.limits import limits_left
 
-    names = [item.name for item in system.parameters]
-    columns = dict(zip((body.name for body in system.bodies), system.body_columns, strict=True))
-
-    def left(q: NDArray[np.float64], t: NDArray[np.float64], p: NDArray[np.float64]) -> list[str]:
-        values = dict(zip(names, p.tolist(), strict=True))
-        return [*limits_left(system.limits, columns, q, t, values)]
-
-    return left
+    return limits_left(system)
 
 
 def _four_bars(system: ConstraintSystem) -> Callable[..., Any]:

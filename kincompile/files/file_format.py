@@ -63,7 +63,10 @@ def fields_of(table: str, count: int = PLANE) -> Mapping[str, Field]:
 def _model(count: int) -> dict[str, Field]:
     """Return the fields of the file itself."""
     prefix = PREFIXES[count]
-    own = {name: kind.tables(prefix + name) for name in ("body", "constraint", "load", "point")}
+    own = {
+        name: kind.tables(prefix + name)
+        for name in ("body", "constraint", "limit", "load", "point")
+    }
     return {
         "$schema": _optional(kind.TEXT),
         "kincompile": Field({"const": VERSION}),
@@ -77,6 +80,7 @@ def _model(count: int) -> dict[str, Field]:
         "coordinates": _optional(kind.tables("coordinate")),
         "sketch": _optional(kind.ref(f"{prefix}sketch")),
         "constraints": _optional(own["constraint"]),
+        "limits": _optional(own["limit"]),
         "gravity": _optional(kind.components(count, words=f"[{', '.join('xyz'[:count])}]")),
         "loads": _optional(own["load"]),
         "points": _optional(own["point"]),

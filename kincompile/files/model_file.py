@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from kincompile.model.bodies import Coordinate, Parameter
     from kincompile.model.constraint import Constraint, Element
     from kincompile.model.declared import Field, Schema
+    from kincompile.model.limits import JointLimit
     from kincompile.model.load import Load
     from kincompile.model.mechanism import Mechanism
     from kincompile.model.outputs import Output
@@ -99,6 +100,7 @@ class _ModelReader(BodyReader):
         for _, row in rows:
             self._declare_contacts(row)
         constraints = [self._constraint(*item) for item in rows]
+        limits = [self._limit(*item) for item in self.rows(data, "limits")]
         outputs = [self._output(*item) for item in self.rows(data, "outputs")]
         loads = [self._load(*item) for item in self.rows(data, "loads")]
         content = {
@@ -109,6 +111,7 @@ class _ModelReader(BodyReader):
             "drawn": drawn.drawn,
             "outputs": [*drawn.outputs, *(item for item in (*points, *outputs) if item)],
             "loads": [item for item in loads if item],
+            "limits": [item for item in limits if item],
             "gravity": self._gravity(data),
             "tasks": self._tasks(data),
         }
@@ -165,6 +168,7 @@ class _ModelReader(BodyReader):
         for item in content["constraints"]:
             model.add(item)
         model.gravity, model.tasks = content["gravity"], content["tasks"]
+        model.limits = content["limits"]
         for load in content["loads"]:
             model.add(load)
         free = content["coordinates"]
@@ -186,6 +190,7 @@ class _ModelReader(BodyReader):
                 gravity=model.gravity,
                 ground=model.ground,
                 tasks=model.tasks,
+                limits=model.limits,
                 **options,
             )
         except ModelError as error:
@@ -227,6 +232,13 @@ class _ModelReader(BodyReader):
     def _output(self, address: Address, row: Row) -> Output | None:
         names = self._moving_names()
         found: Output | None = self._titled("output", address, row, names, "output {!r}")
+        return found
+
+    def _limit(self, address: Address, row: Row) -> JointLimit | None:
+        self.remember(f"limit of {row.get('joint')!r}", address)
+        found: JointLimit | None = self.made(
+            self.words.mechanism.limit_type, row, address, self.names
+        )
         return found
 
     def _moving_names(self) -> dict[str, sympy.Expr]:

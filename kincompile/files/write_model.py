@@ -50,6 +50,7 @@ def model_data(system: ConstraintSystem) -> dict[str, Any]:
         "coordinates": [row(item) for item in _free_coordinates(system)],
         "points": [row(item) for item in system.body_points],
         "outputs": _outputs(system),
+        "limits": [row(item) for item in system.limits],
         "loads": [_load(item) for item in system.loads if type(item.written).__name__ != "Mass"],
         "constraints": [_constraint(item) for item in system.constraints if not _is_own(item)],
     }
@@ -86,7 +87,7 @@ def row(item: Any) -> dict[str, Any]:
 
 def _is_same(given: Any, default: Any) -> bool:
     """Return whether a value is a default, a list entry by entry."""
-    if default is None or isinstance(default, str):
+    if default is None or isinstance(default, str | float):
         return bool(given == default)
     return len(given) == len(default) and all(x == y for x, y in zip(given, default, strict=True))
 

@@ -216,6 +216,11 @@ class Constraint(Element):
         del points
         return ()
 
+    def measured(self, points: Mapping[str, tuple[Scalar, ...]]) -> Constraint | None:
+        """Return the driver of value 0 whose Phi is the value of the joint, where it has one."""
+        own = self.drivers(points)
+        return own[0] if len(own) == 1 else None
+
     @classmethod
     def equations_of(cls, name: str) -> tuple[str, ...]:
         """Return the names of its equations: its own, or with the row appended."""

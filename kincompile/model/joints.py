@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from kincompile.calculus.expressions import Expression, Norm, dot, perpendicular
 from kincompile.calculus.symbols import C, i, j, s_i, s_j, v_i, v_j
 from kincompile.model import arguments as argument
@@ -14,6 +16,11 @@ from kincompile.model.relative import (
     RelativeY,
     separation,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from kincompile.model.expressions import Scalar
 
 
 @constraint_type
@@ -33,6 +40,11 @@ class Revolute(PointToPoint):
         "a point on a line: a {simpler} with value 0 keeps {kept}, a RevoluteTranslational or a "
         "Distance does as well"
     )
+
+    def measured(self, points: Mapping[str, tuple[Scalar, ...]]) -> Constraint:
+        """Return a driver of the angle of body j from body i."""
+        del points
+        return RelativeAngle(self.name, self.i, self.j, 0)
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:
@@ -117,6 +129,12 @@ class Translational(Constraint):
     j: BodyLike = argument.body("j")
     point_j: PlaceLike = argument.point("s_j", on="j")
     axis_j: PointLike = argument.axis("v_j", on="j")
+
+    def measured(self, points: Mapping[str, tuple[Scalar, ...]]) -> Constraint:
+        """Return a driver of the way of the point of body j along the axis of body i."""
+        del points
+        sides = self.i, self.point_i, self.axis_i, self.j, self.point_j
+        return TranslationalDistance(self.name, *sides, 0)
 
     @staticmethod
     def Phi() -> tuple[Expression, ...]:

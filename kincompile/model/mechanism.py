@@ -16,6 +16,7 @@ from kincompile.model.constraint import Constraint, Element
 from kincompile.model.drawn_joints import with_places, with_points
 from kincompile.model.equation import Equation
 from kincompile.model.expressions import evaluate
+from kincompile.model.limits import JointLimit
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.outputs import Output
 from kincompile.model.points import BodyPoint
@@ -64,11 +65,12 @@ class Mechanism(MatrixViews, TextViews):
     links
         Of a robot's file the body of each link by its name there, and its placement (4, 4) on it.
     limits
-        Of a robot's file the limits of its joints.
+        Limits of joints, as `limit` makes them.
     """
 
     fixed: ClassVar[Body] = GROUND
     point_type: ClassVar[type[BodyPoint]] = BodyPoint
+    limit_type: ClassVar[type[JointLimit]] = JointLimit
 
     def __init__(
         self,
@@ -94,7 +96,7 @@ class Mechanism(MatrixViews, TextViews):
         self.tasks: Mapping[str, Any] = {}
         self.drawn: dict[str, Mapping[str, Point]] = {}
         self.links: Mapping[str, tuple[str, Any]] = {}
-        self.limits: Sequence[Any] = ()
+        self.limits: list[JointLimit] = []
 
     @property
     def end(self) -> float:
@@ -219,6 +221,33 @@ class Mechanism(MatrixViews, TextViews):
         made = with_points(expression, vars(outputs), self.named_points())
         self.outputs.append(Output(name, made, unit))
         return cast("Scalar", made)
+
+    def limit(
+        self,
+        joint: Constraint | str,
+        least: Scalar = -math.inf,
+        greatest: Scalar = math.inf,
+        **crosses: Any,
+    ) -> JointLimit:
+        """Give a joint or a driver limits; a solution says which a motion leaves, and when.
+
+        Parameters
+        ----------
+        joint
+            A hinge, a slider or a driver, or its name. The value of a hinge is the angle from body
+            i to body j; of a slider, how far the point of body j is along the axis of body i from
+            its point; of a driver, what it drives.
+        least, greatest
+            Its least and its greatest value [rad or length], numbers or expressions of parameters.
+        **crosses
+            In space: `cross_i` and `cross_j`, directions on the bodies from which and to which the
+            angle of a hinge counts. Without, they are the axes of the bodies that are farthest from
+            the axis of the hinge.
+        """
+        name = joint if isinstance(joint, str) else joint.name
+        made = self.limit_type(name, least, greatest, **crosses)
+        self.limits.append(made)
+        return made
 
     def named_points(self) -> dict[str, BodyPoint]:
         """Return the named points and the joints of a drawing, each on the first link with it."""

@@ -13,6 +13,7 @@ from kincompile.model.bodies import Body
 from kincompile.model.declared import declared, given
 from kincompile.model.expressions import t
 from kincompile.model.laws import RISES
+from kincompile.model.limits import JointLimit
 from kincompile.model.points import BodyPoint
 from kincompile.names import listed
 
@@ -260,7 +261,9 @@ class Point:
     point: str = given(kind.TEXT, "Name of the joint.")
 
 
-TABLES: Mapping[str, type] = {"body": Body, "point": BodyPoint, "sketch": Drawing}
+TABLES: Mapping[str, type] = {
+    "body": Body, "point": BodyPoint, "limit": JointLimit, "sketch": Drawing,
+}  # fmt: skip
 """Tables that are others in space."""
 
 PARTS: Mapping[str, type] = {

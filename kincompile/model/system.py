@@ -28,6 +28,7 @@ from kincompile.model.expressions import (
     Scalar,
     evaluate,
 )
+from kincompile.model.limits import JointLimit, check_limits
 from kincompile.model.matrices import MatrixViews
 from kincompile.model.outputs import (
     Output,
@@ -131,7 +132,7 @@ class ConstraintSystem(MatrixViews, TextViews):
     end_given: Scalar
     points: int
     tasks: Mapping[str, Any]
-    limits: Sequence[Any]
+    limits: tuple[JointLimit, ...]
     links: Mapping[str, tuple[str, Any]]
 
     def __init__(
@@ -153,7 +154,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         points: int = 101,
         tasks: Mapping[str, Any] | None = None,
         links: Mapping[str, tuple[str, Any]] | None = None,
-        limits: Sequence[Any] = (),
+        limits: Sequence[JointLimit] = (),
     ) -> None:
         problems: list[str] = []
         bodies = checked_bodies(bodies, problems)
@@ -176,6 +177,7 @@ class ConstraintSystem(MatrixViews, TextViews):
         check_names(name, bodies, found, declared, written, named, problems)
         scope = _scope(bodies, found, declared, problems, ground)
         constraints = _resolved(written, scope)
+        check_limits(limits, [item.name for item in written], constraints, scope)
         observers = resolved_observers(body_points, asked, scope, length_unit)
         given = members(loads, "loads", problems)
         applied = _loads(bodies, given, gravity, scope, written, (length_unit, mass_unit))
@@ -191,7 +193,7 @@ class ConstraintSystem(MatrixViews, TextViews):
             "constraints": constraints, "equations": names, "body_points": body_points,
             "observers": observers, "loads": applied, "gravity": gravity, "ground": ground,
             "length_unit": length_unit, "mass_unit": mass_unit, "end": last, "end_given": end,
-            "points": points, "tasks": tasks or {}, "links": links or {}, "limits": limits,
+            "points": points, "tasks": tasks or {}, "links": links or {}, "limits": tuple(limits),
         }  # fmt: skip
         _fill(self, values)
 

@@ -9,6 +9,7 @@ from kincompile.errors import KincompileWarning
 from kincompile.model.mechanism import Mechanism as PlanarMechanism
 from kincompile.space.bodies import GROUND, SpatialBody
 from kincompile.space.guesses import IDENTITY, OrientationError, euler_parameters
+from kincompile.space.limits import SpatialLimit
 from kincompile.space.points import SpatialPoint
 from kincompile.space.primitives import Normalization
 
@@ -28,6 +29,7 @@ class Mechanism(PlanarMechanism):
 
     fixed = GROUND
     point_type = SpatialPoint
+    limit_type = SpatialLimit
     bodies: list[SpatialBody]  # type: ignore[assignment]
 
     def body(  # type: ignore[override]  # a place and an orientation

@@ -8,6 +8,7 @@ from kincompile.model import declared as kind
 from kincompile.model import sections as plane
 from kincompile.model.declared import declared, given
 from kincompile.space.bodies import INERTIA, Placed
+from kincompile.space.limits import SpatialLimit
 from kincompile.space.points import SpatialPoint
 
 if TYPE_CHECKING:
@@ -79,7 +80,9 @@ class Rod:
     )
 
 
-TABLES: Mapping[str, type] = {"body": Placed, "point": SpatialPoint, "sketch": Drawing}
+TABLES: Mapping[str, type] = {
+    "body": Placed, "point": SpatialPoint, "limit": SpatialLimit, "sketch": Drawing,
+}  # fmt: skip
 """Tables that are others in the plane."""
 
 PARTS: Mapping[str, type] = {

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import least_squares
 
-from kincompile.files.robots.robot import placement, skew
+from kincompile.files.robots.robot import placement, skew, turned
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -108,12 +108,12 @@ class Tree:
         return row
 
     def limits(self) -> tuple[Array, Array]:
-        """Return the least and the greatest of each value; where both are equal there are none."""
+        """Return the least and the greatest of each value."""
         low, high = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         for name, place in self.places.items():
             joint = self.robot.joints[name]
-            if joint.limits is not None and joint.limits[0] < joint.limits[1]:
-                low[place], high[place] = (value - joint.reference for value in joint.limits)
+            if joint.is_limited:
+                low[place], high[place] = joint.limits
         return low, high
 
     def closed(self, x: Array, free: Array, limits: tuple[Array, Array] | None = None) -> Array:
@@ -235,16 +235,6 @@ def _outside(tree: Tree, x: Array, limits: tuple[Array, Array]) -> list[str]:
 def _inverse(frame: Array) -> Array:
     turn = frame[:3, :3].T
     return placement(-turn @ frame[:3, 3], turn)
-
-
-def turned(rotation: Array) -> Array:
-    """Return the matrix (3, 3) of a rotation vector."""
-    angle = float(np.linalg.norm(rotation))
-    v = skew(rotation)
-    if angle < 1e-9:
-        return np.asarray(np.eye(3) + v)
-    s, c = np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2
-    return np.asarray(np.eye(3) + s * v + c * v @ v)
 
 
 def rotation_vector(turn: Array) -> Array:

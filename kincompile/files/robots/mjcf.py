@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from kincompile.errors import InputError
 from kincompile.files.content import file_content
@@ -24,6 +25,7 @@ from kincompile.files.robots.robot import (
     from_quaternion,
     order_tree,
     placement,
+    turned,
 )
 from kincompile.files.robots.xml_text import LARGEST, Element, XmlReader, read_xml
 from kincompile.names import escaped, shown
@@ -231,8 +233,13 @@ class _MjcfReader(XmlReader):
             kind = {BALL: "spherical", SLIDE: "prismatic"}.get(int(model.jnt_type[j]), "revolute")
             made = Joint(joint, kind, parent, child, at @ pivot, on=pivot, line=line)
             if kind != "spherical":
-                made.axes = (np.array(model.jnt_axis[j]),)
-                made.reference = float(model.qpos0[model.jnt_qposadr[j]])
+                axis, reference = np.array(model.jnt_axis[j]), model.qpos0[model.jnt_qposadr[j]]
+                back = -reference * axis
+                made.axes = (axis,)
+                slides = kind == "prismatic"
+                zero = placement(back) if slides else placement((0, 0, 0), turned(back))
+                made.at = made.at @ zero
+                self._robot.start[joint] = (float(reference),)
                 if model.jnt_limited[j]:
                     made.limits = tuple(model.jnt_range[j].tolist())
             self._robot.joints[joint] = made
@@ -246,10 +253,11 @@ class _MjcfReader(XmlReader):
         name = f"closure_{k + 1}"
         line = self._equalities[k].line
         if kind == JOINT:
-            left, right = ({self._joints[j]: 1.0} if j in self._joints else {} for j in ids)
-            factors = tuple(data[:5].tolist())
-            while len(factors) > 1 and not factors[-1]:
-                factors = factors[:-1]
+            names = [self._joints.get(j, "") for j in ids]
+            first, second = (self._robot.start.get(x, (0.0,))[0] for x in names)
+            of_values = Polynomial(data[:5]).trim()(Polynomial([-second, 1.0])) + first
+            left, right = ({x: 1.0} if x else {} for x in names)
+            factors = tuple(of_values.coef.tolist())
             self._robot.couplings.append(Coupling(name, left, right, factors, line))
             return
         if "site1" in self._equalities[k].attributes:

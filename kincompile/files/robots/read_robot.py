@@ -127,8 +127,7 @@ def _begin(tree: Tree, pose: Mapping[str, Any]) -> Array:
                 + ("numbers (w, x, y, z)" if count == 4 else f"number{'s' * (count > 1)}")
             )
         is_ball = joint.kind == "spherical"
-        begun = _of_quaternion(values, name) if is_ball else values - joint.reference
-        x[tree.places[name]] = begun
+        x[tree.places[name]] = _of_quaternion(values, name) if is_ball else values
     return x
 
 

@@ -67,7 +67,7 @@ class Mass:
 
 @dataclass(slots=True, eq=False)
 class Joint:
-    """A joint of the tree. T_child = T_parent at motion(value - reference) on^-1."""
+    """A joint of the tree. T_child = T_parent at motion(value) on^-1."""
 
     name: str
     kind: str
@@ -76,14 +76,18 @@ class Joint:
     at: Array
     axes: tuple[Array, ...] = ()  # unit vectors in the joint's frame; a universal joint has two
     on: Array = field(default_factory=lambda: np.eye(4))  # its frame after the motion, in the child
-    limits: tuple[float, float] | None = None
-    reference: float = 0.0
+    limits: tuple[float, float] = (0.0, 0.0)  # where both are equal there are none
     line: int = 1
 
     @property
     def freedoms(self) -> int:
         """How many values it has."""
         return FREEDOMS[self.kind]
+
+    @property
+    def is_limited(self) -> bool:
+        """Whether it has limits."""
+        return self.limits[0] < self.limits[1]
 
 
 @dataclass(slots=True, eq=False)
@@ -102,7 +106,7 @@ class Closure:
 class Coupling:
     """Sum of left values = a_0 + a_1 x + ... with the sum x of right values.
 
-    Values are those of hinges and slides, less their references, with factors.
+    Values are those of hinges and slides, with factors.
     """
 
     name: str
@@ -265,6 +269,16 @@ def from_quaternion(r: Sequence[float] | Array, wxyz: Sequence[float] | Array) -
 def skew(v: Array) -> Array:
     """Return v~, with v~ w = v x w."""
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def turned(rotation: Array) -> Array:
+    """Return the matrix (3, 3) of a rotation vector."""
+    angle = float(np.linalg.norm(rotation))
+    v = skew(rotation)
+    if angle < 1e-9:
+        return np.asarray(np.eye(3) + v)
+    s, c = np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2
+    return np.asarray(np.eye(3) + s * v + c * v @ v)
 
 
 def beside(axis: Array) -> Array:

@@ -138,7 +138,7 @@ class _Sidecar(XmlReader):
             universal = re.fullmatch(r"UJOINT_([XYZ])([XYZ])", kind.upper())
             if joint is None:
                 continue
-            joint.limits = None
+            joint.limits = (0.0, 0.0)
             if kind.upper() == "FIXED":
                 joint.kind, joint.axes = "fixed", ()
             elif kind.upper() == "SPHERICAL":

@@ -22,7 +22,6 @@ from kincompile.space.joints import (
     Universal,
 )
 from kincompile.space.joints import RelativeTranslation as Slide
-from kincompile.space.limits import JointLimit
 from kincompile.space.mechanism import Mechanism
 from kincompile.space.points import SpatialPoint
 
@@ -116,35 +115,20 @@ class _Builder:
             link: ("ground" if body == robot.root else self._names[body], place)
             for link, (body, place) in self._host.items()
         }
-        made.limits = [
-            self._limit(joint, *joint.limits)
-            for joint in robot.joints.values()
-            if joint.freedoms == 1
-            and joint.limits is not None
-            and joint.limits[0] < joint.limits[1]
-        ]
+        for joint in robot.joints.values():
+            if joint.freedoms == 1 and joint.is_limited:
+                self._limit(joint)
         self._show_names()
         return made
 
-    def _limit(self, joint: Joint, least: float, greatest: float) -> JointLimit:
-        """Return the limits of a hinge or a slide."""
-        sides = [self._host[joint.parent], self._host[joint.child]]
-        bodies = ["ground" if body == self._robot.root else self._names[body] for body, _ in sides]
-        frames = [place @ at for (_, place), at in zip(sides, (joint.at, joint.on), strict=True)]
-        name, axis = self._joint_names[joint.name], joint.axes[0]
-        return JointLimit(
-            name,
-            "m" if joint.kind == "prismatic" else "rad",
-            (bodies[0], bodies[1]),
-            (frames[0], frames[1]),
-            axis,
-            beside(axis),
-            least,
-            greatest,
-            joint.reference,
-            float(self._x[self._tree.places[joint.name]][0]) + joint.reference,
-            name if joint.name in self._parameters else "",
-        )
+    def _limit(self, joint: Joint) -> None:
+        """Give a hinge or a slide its limits."""
+        crosses: dict[str, Any] = {}
+        if joint.kind == "revolute" and joint.name not in self._parameters:
+            sides = self._side(joint.parent, joint.at), self._side(joint.child, joint.on)
+            found = (_triad(frame, joint.axes[0])[1] for _, frame in sides)
+            crosses = dict(zip(("cross_i", "cross_j"), found, strict=True))
+        self._made.limit(self._joint_names[joint.name], *joint.limits, **crosses)
 
     def _show_names(self) -> None:
         pairs = {**self._joint_names, **self._names}
@@ -204,18 +188,16 @@ class _Builder:
     def _drive(self, name: str) -> None:
         joint = self._robot.joints[name]
         unit = "rad" if joint.kind == "revolute" else "m"
-        (value,) = _tidy(self._x[self._tree.places[name]] + joint.reference)
-        low, high = joint.limits or (0.0, 0.0)
-        if not low < high:
-            low, high = value - SLIDER, value + SLIDER
+        (value,) = _tidy(self._x[self._tree.places[name]])
+        low, high = joint.limits if joint.is_limited else (value - SLIDER, value + SLIDER)
         limits = (low, high) if low <= value <= high else None
         legal = self._joint_names[name]
         parameter = self._made.parameter(legal, value, unit, limits)
         self._parameters[name] = parameter
-        self._made.add(self._driver(joint, legal, parameter - joint.reference))
+        self._made.add(self._driver(joint, legal, parameter))
 
     def _driver(self, joint: Joint, name: str, value: Any) -> Constraint:
-        """Return the driver that gives a hinge or a slide a value, less its reference."""
+        """Return the driver that gives a hinge or a slide a value."""
         i, a = self._side(joint.parent, joint.at)
         j, b = self._side(joint.child, joint.on)
         axis = joint.axes[0]
@@ -238,10 +220,10 @@ class _Builder:
         return sum((factor * self._value(name) for name, factor in factors.items()), sympy.S.Zero)
 
     def _value(self, name: str) -> Any:
-        """Return a joint's value, less its reference, as an expression."""
+        """Return a joint's value as an expression."""
         joint = self._robot.joints[name]
         if name in self._parameters:
-            return self._parameters[name] - joint.reference
+            return self._parameters[name]
         if name not in self._measured:
             i, a = self._side(joint.parent, joint.at)
             j, b = self._side(joint.child, joint.on)

@@ -415,6 +415,27 @@ def test_mjcf_that_is_refused(tmp_path: Path) -> None:
         kc.read(path, loops="a.yaml")
 
 
+def test_that_mjcf_counts_values_from_its_references(tmp_path: Path) -> None:
+    """A hinge that stands at 30 degrees as drawn, and a slide at 0.2 that follows it."""
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="a"><joint name="turn" axis="0 0 1" ref="30" '
+        'range="-40 60"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
+        '<body name="b" pos="1 0 0"><joint name="way" type="slide" axis="0 1 0" ref="0.2"/>'
+        '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody><equality>'
+        '<joint joint1="way" joint2="turn" polycoef="0.1 2 3"/></equality>'
+        '<actuator><motor joint="turn"/></actuator></mujoco>'
+    )
+    m = kc.read(path)
+    assert m.parameters[0].default == pytest.approx(np.pi / 6)
+    assert m.parameters[0].range == pytest.approx(np.deg2rad([-40, 60]))
+    solution = kc.solve(kc.compile(m), [0.0], {"turn": 0.7})
+    turned = 0.7 - np.pi / 6
+    assert spatial.frame(solution, "a")[1][0].as_rotvec()[2] == pytest.approx(turned, abs=1e-12)
+    way = 0.1 + 2 * turned + 3 * turned**2
+    assert spatial.frame(solution, "b")[0][0] == pytest.approx([1, way, 0], abs=1e-12)
+
+
 SHAPES = (
     '<visual><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/><geometry>'
     '<box size="0.4 0.2 0.1"/></geometry></visual><visual><geometry>'
@@ -491,13 +512,15 @@ def test_that_limits_that_a_motion_leaves_are_named_with_time_and_value(tmp_path
     m = changed(m, constraints=list(m.constraints))
     k = next(k for k, item in enumerate(m.constraints) if item.name == "crank")
     m.constraints[k] = replace(m.constraints[k], angle=m.constraints[k].angle + kc.t)
-    module = kc.compile(m)
-    with pytest.warns(KincompileWarning, match="Joint crank leaves its limit of 1.1 rad") as seen:
-        said = kc.solve(module, t).message
-    assert str(seen[0].message).removeprefix("n_4_bar: ") in said
-    assert "Joint crank leaves its limit of 1.1 rad at t = 0.81; it is 1.3 at t = 1." in said
+    (written := tmp_path / "robot.toml").write_text(m.to_toml())
     first, worst = int(np.argmax(rocker > middle)), int(np.argmax(rocker))
-    assert (
-        f"Joint rocker leaves its limit of {middle:.6g} rad at t = {t[first]:.10g}; it is "
-        f"{rocker[worst]:.6g} at t = {t[worst]:.10g}."
-    ) in said
+    for item in (m, kc.read(written)):
+        module = kc.compile(item)
+        with pytest.warns(KincompileWarning, match=r"Joint crank leaves its limit of 1\.1") as seen:
+            said = kc.solve(module, t).message
+        assert str(seen[0].message).removeprefix("n_4_bar: ") in said
+        assert "Joint crank leaves its limit of 1.1 rad at t = 0.81; it is 1.3 at t = 1." in said
+        assert (
+            f"Joint rocker leaves its limit of {middle:.6g} rad at t = {t[first]:.10g}; it is "
+            f"{rocker[worst]:.6g} at t = {t[worst]:.10g}."
+        ) in said

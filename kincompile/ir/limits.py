@@ -1,0 +1,77 @@
+"""Which limits of joints a motion leaves, and when."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kincompile.ir.interpret import interpreter
+from kincompile.ir.lower import lower
+from kincompile.model.expressions import as_sympy
+from kincompile.model.limits import value_of
+from kincompile.model.resolve import FreeEquation, Joint
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from kincompile.model.system import ConstraintSystem
+
+    Array = NDArray[np.float64]
+
+NEAR = 1e-9
+"""How far beyond a limit a joint may be by rounding errors [rad or length]."""
+
+
+def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], list[str]]:
+    """Return what gives a sentence for each limit that positions q (N, n) at times t (N,) leave.
+
+    The value of a driver is its C. That of another joint is Phi of a driver with C = 0, which in
+    space is an angle within one turn.
+    """
+    joints = {item.name: item for item in system.constraints if isinstance(item, Joint)}
+    limits = [item for item in system.limits if item.joint in joints]
+    limits.sort(key=lambda item: not joints[item.joint].has_value)
+    measuring: list[Any] = [item.measuring(joints[item.joint]) for item in limits]
+    driven = [joints[item.joint] for item in limits if joints[item.joint].has_value]
+    own = [FreeEquation(x.name, (as_sympy(x.scalars["C"]),), (), (x.name,)) for x in driven]
+    program = lower(system.rewritten(own, measuring[len(own) :]))
+    Phi = interpreter(program, ("Phi",))
+    within_a_turn = system.ground.kind.turning[1]
+    names = [item.name for item in system.parameters]
+    units = [value_of(item).unit for item in measuring]
+
+    def left(q: Array, t: Array, p: Array) -> list[str]:
+        found = np.isfinite(q).all(axis=1)
+        if not found.any():
+            return []
+        q, t = q[found], t[found]
+        (values,) = Phi(q, np.zeros_like(q), t, p)
+        given, sentences = dict(zip(names, p.tolist(), strict=True)), []
+        for k, (limit, unit) in enumerate(zip(limits, units, strict=True)):
+            ends = limit.ends(given, [], unit)
+            counted = values[:, k]
+            if type(measuring[k]).__name__ == within_a_turn and k >= len(own):
+                counted = _over_turns(counted, ends)
+            for sign, most in zip((-1.0, 1.0), ends, strict=True):
+                beyond = sign * (counted - most)
+                if beyond.max() > NEAR:
+                    first, last = int(np.argmax(beyond > NEAR)), int(np.argmax(beyond))
+                    sentences.append(
+                        f"Joint {limit.joint} leaves its limit of {most:.6g} "
+                        f"{unit if unit == 'rad' else system.length_unit} at t = {t[first]:.10g}; "
+                        f"it is {counted[last]:.6g} at t = {t[last]:.10g}"
+                    )
+        return sentences
+
+    return left
+
+
+def _over_turns(angles: Array, ends: Sequence[float]) -> Array:
+    """Return angles over turns; the first is within the limits, or nearest to their middle."""
+    if ends[0] <= angles[0] <= ends[1]:
+        return np.unwrap(angles)
+    middle = np.mean([end for end in ends if np.isfinite(end)] or [0.0])
+    return np.unwrap(np.concatenate(([middle], angles)))[1:]
