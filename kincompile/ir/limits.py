@@ -26,7 +26,7 @@ NEAR = 1e-9
 
 
 def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], list[str]]:
-    """Return what gives a sentence for each limit that positions q (N, n) at times t (N,) leave.
+    """Return a function of positions (N, n), times (N,) and parameters: sentences on limits left.
 
     The value of a driver is its C. That of another joint is Phi of a driver with C = 0, which in
     space is an angle within one turn.
