@@ -84,20 +84,23 @@ def before_dead_centre(module, seed: int, away: float) -> tuple[np.ndarray, np.n
 
 @pytest.mark.parametrize("away", [1e-2, 1e-5, 1e-8])
 @pytest.mark.parametrize("make", MECHANISMS[:2], ids=NAMES[:2])
-def test_that_before_a_dead_centre_x_is_as_right_as_lapacks(make, away: float) -> None:
-    """A plan without pivots loses nothing there: what is lost any method loses."""
-    module, errors = kc.compile(make()), []
+def test_that_before_a_dead_centre_the_plan_is_backward_stable(make, away: float) -> None:
+    """A plan without pivots loses nothing there: its x is that of a matrix one rounding away.
+
+    Measured is what Phi_q x misses of b, by their sizes. Near a dead centre x itself differs by
+    chance, with LAPACK too: a hundred times from one rounding to another.
+    """
+    module, missed = kc.compile(make()), []
     places = (before_dead_centre(module, seed, away) for seed in range(8))
     for q, b in filter(None, places):
         Phi_q = module.Phi_q(q, 0.3)
+        x = module.solve(module.Phi_q_nonzeros(q, 0.3), b)
         with mpmath.workdps(40):
-            exact = mpmath.lu_solve(mpmath.matrix(Phi_q.tolist()), mpmath.matrix(b.tolist()))
-        right = np.array([float(x) for x in exact])
-        found = module.solve(module.Phi_q_nonzeros(q, 0.3), b), np.linalg.solve(Phi_q, b)
-        errors.append([np.abs(x - right).max() / np.abs(right).max() for x in found])
-    assert len(errors) > 4
-    ours, lapacks = np.max(errors, axis=0)
-    assert ours < 10 * lapacks
+            rest = mpmath.matrix(b.tolist()) - mpmath.matrix(Phi_q.tolist()) * mpmath.matrix(x)
+        size = np.abs(Phi_q).sum(axis=1).max() * np.abs(x).max()
+        missed.append(max(abs(float(y)) for y in rest) / size)
+    assert len(missed) > 4
+    assert max(missed) < 10 * np.finfo(float).eps
 
 
 @pytest.mark.parametrize("linkage", LINKAGES, ids=lambda item: item.name)
