@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
     from kincompile.structure.rank import Evaluate
     from kincompile.structure.remedies import Surplus
 
+# Freedoms that nothing sees, redundant equations and `inspect` ask for that of one system.
+_RANKS: WeakKeyDictionary[ConstraintSystem, RankReport] = WeakKeyDictionary()
 HALF_TURN = 0.1
 """e0 of an orientation so near to half a turn that no AbsoluteOrientation should begin there."""
 
@@ -50,9 +53,18 @@ def rank_report(
 
     The guess, shape (n,), is where it is meant to be assembled; without it, the system's own.
     """
+    if guess is not None:
+        return _ranks(system, program, guess)
+    if system not in _RANKS:
+        own = np.array([item.guess for item in system.coordinates])
+        _RANKS[system] = _ranks(system, program, own)
+    return _RANKS[system]
+
+
+def _ranks(system: ConstraintSystem, program: Program, guess: NDArray[np.float64]) -> RankReport:
     return generic_rank(
         evaluation(program),
-        np.array([item.guess for item in system.coordinates]) if guess is None else guess,
+        guess,
         _angular(system),
         driver_rows(system),
         _rows(system, lambda item: isinstance(item, Joint) and item.written.is_own),

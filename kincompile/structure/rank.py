@@ -237,7 +237,14 @@ class _Analysis:
         There the independent joints hold, and a row that repeats them depends on them, too.
         """
         matrices = self._scaled(q, t)
-        best = max(range(len(q)), key=lambda k: _rank_and_gap(matrices[k], limit))
+        ranks = [_rank_and_gap(matrix, limit) for matrix in matrices]
+        if self._drivers and max(ranks)[0] < min(matrices.shape[1:]):
+            # The joints may hold on a branch on which the drivers cannot move them.
+            led, held, settled = self._assemble([*self._joints, *self._drivers], q, t)
+            q, t = np.vstack([q, led[held & settled]]), np.append(t, t[held & settled])
+            matrices = self._scaled(q, t)
+            ranks += [_rank_and_gap(matrix, limit) for matrix in matrices[len(ranks) :]]
+        best = ranks.index(max(ranks))
         kept, dependent = _split(matrices[best], self._joints, limit)
         if not dependent or len(kept) == matrices.shape[2]:
             return self._state(q, t, best)

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 SEED = 1989
 """Any will do; fixed, so that the result is the same on every run."""
 
-FIRST_STARTS, MOST_STARTS = 60, 400
-"""Starts that are tried at least and at most."""
+FIRST_STARTS, ASIDE, MOST_STARTS = 60, 120, 400
+"""Starts that are tried at least, at most beside a solve, and at most."""
 
 PATIENCE = 6
 """The search ends when it has tried this many times the starts after which the last way to assemble
@@ -91,12 +91,17 @@ def assemblies(module: ModuleType, t: float = 0.0, p: Values = None) -> Vector:
 
 def assembled_positions(inputs: Inputs) -> Vector:
     """Return what `assemblies` does, at the first time, for inputs that are checked."""
+    return _searched(inputs, MOST_STARTS)[0]
+
+
+def _searched(inputs: Inputs, most: int) -> tuple[Vector, bool]:
+    """Return assemblies that are found from starts, and whether more starts promise no more."""
     time = float(inputs.t[0])
     with np.errstate(all="ignore"):
         equations = _equations(inputs)
         found: list[Vector] = []
         last = 0
-        for k, start in enumerate(spread_starts(equations, inputs.guess), 1):
+        for k, start in enumerate(spread_starts(equations, inputs.guess)[:most], 1):
             point = _assembled(equations, time, start)
             if point is not None:
                 q = unwound(equations, time, point, inputs.guess, SMALL_CORRECTION).q
@@ -106,7 +111,7 @@ def assembled_positions(inputs: Inputs) -> Vector:
             if k >= max(FIRST_STARTS, PATIENCE * last):
                 break
         order = sorted(found, key=lambda q: _rank(equations, q, inputs.guess))
-    return np.array(order).reshape(len(order), inputs.guess.size)
+    return np.array(order).reshape(len(order), inputs.guess.size), k >= PATIENCE * last
 
 
 def is_new(equations: Problem, q: Vector, others: Iterable[Vector]) -> bool:
@@ -136,7 +141,7 @@ def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
     without = inputs.without_guess
     if q.size > MOST_COORDINATES or not (is_folded or _is_open(inputs, q, without)):
         return ""
-    found = assembled_positions(inputs)
+    found, is_whole = _searched(inputs, ASIDE)
     equations = _equations(inputs)
     away = [equations.distance(q, other) for other in found]
     if len(found) < 2:
@@ -148,10 +153,13 @@ def unchosen(inputs: Inputs, q: Vector, is_folded: bool) -> str:
     differing = dict.fromkeys(owners[inputs.code.coordinates[k]] for k in np.flatnonzero(moved))
     missing = [body for body in differing if body in without]
     cause = f"there is no guess of {listed(missing)}" if missing else "the guess lies folded"
+    count = f"there are {len(found)}" if is_whole else f"there are at least {len(found)}"
+    number = f"this is number {taken + 1}. Take another with assembly={2 if taken == 0 else 1}"
+    if not is_whole:  # in the order of all of them it may have another number
+        number = "take one of kc.assemblies by its number"
     return (
-        f"{inputs.code.name}: {cause}, and there are {len(found)} assemblies at "
-        f"t = {inputs.t[0]:.10g}, which differ in {listed(differing)}; this is number {taken + 1}. "
-        f"Take another with assembly={2 if taken == 0 else 1} (--assembly on the command line; "
+        f"{inputs.code.name}: {cause}, and {count} assemblies at t = {inputs.t[0]:.10g}, which "
+        f"differ in {listed(differing)}; {number} (--assembly on the command line; "
         "kincompile assemblies draws them), or give a guess nearer to it."
     )
 
