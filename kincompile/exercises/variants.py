@@ -186,6 +186,8 @@ class VariantBuilder:
             gravity=tuple(self._value(item, 1.0) for item in given.gravity),
             end=float(sympy.sympify(given.end_given).subs(self._values)),
             tasks={},
+            limits=[],
+            outline=(),
         )
 
     def _body(self, body: Body) -> Body:

@@ -81,6 +81,7 @@ def _model(count: int) -> dict[str, Field]:
         "sketch": _optional(kind.ref(f"{prefix}sketch")),
         "constraints": _optional(own["constraint"]),
         "limits": _optional(own["limit"]),
+        "outline": fields_of("body", count)["outline"],
         "gravity": _optional(kind.components(count, words=f"[{', '.join('xyz'[:count])}]")),
         "loads": _optional(own["load"]),
         "points": _optional(own["point"]),

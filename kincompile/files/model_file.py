@@ -18,6 +18,7 @@ nothing in it is run. All problems are reported together, each with line and fie
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import sympy
@@ -81,6 +82,7 @@ class _ModelReader(BodyReader):
         if not self._is_model(data):
             return None
         fields = form.fields_of("model", self.words.count)
+        self.remember("outline of ground", ("outline",))
         self.has_fields((), {"kincompile": form.VERSION, **data}, fields)
         name = self.name(data, (), "the model") or "model"
         given = [self._parameter(*item) for item in self.rows(data, "parameters")]
@@ -112,17 +114,17 @@ class _ModelReader(BodyReader):
             "outputs": [*drawn.outputs, *(item for item in (*points, *outputs) if item)],
             "loads": [item for item in loads if item],
             "limits": [item for item in limits if item],
-            "gravity": self._gravity(data),
+            "gravity": self._own(data, "gravity", (0,) * self.words.count),
+            "outline": self._own(data, "outline", ()),
             "tasks": self._tasks(data),
         }
         return self._checked(name, content, options)
 
-    def _gravity(self, data: Row) -> tuple[Any, ...]:
-        """Return the components of gravity, zeros where the file has none."""
-        schema = form.fields_of("model", self.words.count)["gravity"].schema
-        nothing = [0] * self.words.count
-        given = self.value(data.get("gravity", nothing), schema, ("gravity",), self.names)
-        return tuple(given or nothing)
+    def _own(self, data: Row, key: str, without: Any) -> Any:
+        """Return a value of the file itself, in place of which another stands."""
+        schema = form.fields_of("model", self.words.count)[key].schema
+        given = self.value(data[key], schema, (key,), self.names) if key in data else None
+        return without if given is None else given
 
     def _tasks(self, data: Row) -> Row:
         """Return the tables of commands, whose fields are those of the format."""
@@ -168,7 +170,7 @@ class _ModelReader(BodyReader):
         for item in content["constraints"]:
             model.add(item)
         model.gravity, model.tasks = content["gravity"], content["tasks"]
-        model.limits = content["limits"]
+        model.limits, model.outline = content["limits"], content["outline"]
         for load in content["loads"]:
             model.add(load)
         free = content["coordinates"]
@@ -188,7 +190,7 @@ class _ModelReader(BodyReader):
                 outputs=model.outputs,
                 loads=model.loads,
                 gravity=model.gravity,
-                ground=model.ground,
+                ground=replace(model.ground, outline=model.outline),
                 tasks=model.tasks,
                 limits=model.limits,
                 **options,

@@ -63,6 +63,7 @@ def model_data(system: ConstraintSystem) -> dict[str, Any]:
         **({} if system.mass_unit == "kg" else {"mass_unit": system.mass_unit}),
         "analysis": row(_analysis(system)),
         **({"gravity": gravity} if any(gravity) else {}),
+        **({"outline": data(system.ground.outline)} if len(system.ground.outline) else {}),
         **{name: rows for name, rows in sections.items() if rows},
         **system.tasks,
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
@@ -57,6 +58,8 @@ class Mechanism(MatrixViews, TextViews):
         The fixed frame.
     gravity
         Acceleration of gravity (g_x, g_y), none at first: ``m.gravity = (0, -9.81)``.
+    outline
+        What the ground looks like, as the `outline` of a body: for pictures, none at first.
     tasks
         The tables ``tolerance``, ``fit`` and ``sweep`` of the file that it was read from, as data:
         commands of these names read them, and `to_toml` writes them.
@@ -93,6 +96,7 @@ class Mechanism(MatrixViews, TextViews):
         self.outputs: list[BodyPoint | Output] = []
         self.loads: list[Element] = []
         self.gravity: Scalars = (0,) * len(self.fixed.kind.axes)
+        self.outline: Any = ()
         self.tasks: Mapping[str, Any] = {}
         self.drawn: dict[str, Mapping[str, Point]] = {}
         self.links: Mapping[str, tuple[str, Any]] = {}
@@ -297,7 +301,7 @@ class Mechanism(MatrixViews, TextViews):
             outputs=self.outputs,
             loads=self.loads,
             gravity=self.gravity,
-            ground=self.ground,
+            ground=replace(self.ground, outline=self.outline),
             length_unit=self.length_unit,
             mass_unit=self.mass_unit,
             end=self.end_given,

@@ -166,7 +166,7 @@ class ConstraintSystem(MatrixViews, TextViews):
             *free_coordinates(coordinates, guess, defaults, problems),
             *contact_coordinates(written, defaults, problems),
         ]
-        check_outlines(bodies, defaults, problems)
+        check_outlines((ground, *bodies), defaults, problems)
         last: Any = (
             checked_number(end, "end", defaults, problems) if isinstance(end, sympy.Expr) else end
         )

@@ -6,7 +6,7 @@ import itertools
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from kincompile.view.marks import Hull, Polygon, Symbol, moves_with
+from kincompile.view.marks import GROUND_FRAME, Hull, Polygon, Symbol, moves_with
 from kincompile.view.worlds import PLANE
 
 if TYPE_CHECKING:
@@ -32,11 +32,11 @@ MADE_OF: dict[int, Callable[[BodyFrame, Any], Polygon | Hull]] = {
 def outlines(bodies: Iterable[Body], geometry: Geometry) -> list[Polygon | Hull]:
     """Return the outlines of those bodies that have one.
 
-    From back to front: the first body hides what slides in it.
+    From back to front: the first body hides what slides in it, and the ground is behind all.
     """
     found: list[Polygon | Hull] = []
     for body in bodies:
-        frame = geometry.frames[body.name]
+        frame = geometry.frames.get(body.name, GROUND_FRAME)
         for _, solid in body.solids:
             corners: tuple[Point, ...] = tuple(map(geometry.numbers, solid))
             if corners:

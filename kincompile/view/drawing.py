@@ -178,7 +178,7 @@ def drawing(
         joint.name: marks_of(joint.written, JointGeometry(joint, geometry), drawings)
         for joint in joints
     }
-    bodies: list[Mark] = [*outlines(system.bodies, geometry)]
+    bodies: list[Mark] = [*outlines((*system.bodies, system.ground), geometry)]
     marks = _uncovered(itertools.chain(*by_joint.values()), set().union(*map(moves_with, bodies)))
     marks = [*bodies, *marks]
     dots = [Dot(item.name, geometry.on_body(item)) for item in system.body_points]

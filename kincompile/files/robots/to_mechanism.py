@@ -89,6 +89,7 @@ class _Builder:
         made, robot = self._made, self._robot
         frames, *_ = self._tree.frames(self._x)
         masses, outlines = self._masses(), self._outlines()
+        made.outline = outlines.get(robot.root, ())
         for link, name in self._names.items():
             if link in self._tips:
                 continue

@@ -22,7 +22,7 @@ from kincompile.files.robots.urdf import read_urdf
 from kincompile.files.robots.xml_text import read_xml
 from kincompile.model.mechanism import changed
 from kincompile.view.drawing import drawing
-from kincompile.view.marks import Hull, shape_of
+from kincompile.view.marks import GROUND_FRAME, Hull, shape_of
 
 DATA = Path(__file__).parents[2] / "data" / "robots"
 SMALL, LARGE = ["5bar_linkage_iso3d", "welded_four_bar"], [
@@ -471,6 +471,24 @@ def test_that_shapes_of_links_are_drawn_and_meshes_named(
     shells = [x for x in drawn.marks if isinstance(x, Hull) and x.style == "shell"]
     assert [len(x.points) for x in shells] == [50, 24, 8]
     assert "stub" in {shape_of(x) for x in drawn.marks}  # b, by its joint
+
+
+def test_that_shapes_of_the_root_stand_still_in_every_picture(tmp_path: Path) -> None:
+    text = TREE.format("continuous", "").replace(
+        '<link name="base"/>', f'<link name="base">{SHAPES}</link>'
+    )
+    m = model(tmp_path, text)
+    (written := tmp_path / "robot.toml").write_text(m.to_toml())
+    for found in (m, kc.read(written)):
+        assert_shapes(found.system().ground)
+        drawn = drawing(found)
+        shells = [x for x in drawn.marks if isinstance(x, Hull) and x.style == "shell"]
+        assert [(x.frame, len(x.points)) for x in shells] == [
+            (GROUND_FRAME, 50), (GROUND_FRAME, 24), (GROUND_FRAME, 8),
+        ]  # fmt: skip
+    m.outline = [m.outline[0][:3]]
+    with pytest.raises(kc.ModelError, match="outline of ground, solid 1: it has 3 corners"):
+        m.system()
 
 
 def test_that_shapes_of_mjcf_are_drawn_and_have_no_mass(tmp_path: Path) -> None:
