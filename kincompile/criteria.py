@@ -107,6 +107,13 @@ SOLVED = 1e-10
 leaves of it up to the sensitivity from which rates are uncertain. Terms are those of the
 equation's own coefficients and the largest component of x, in scales."""
 
+ON_CURVE = 1e-13
+"""Correction, in scales, of a point on a curve between two others, up to which its velocity and
+acceleration are those of the corrected position."""
+
+CURVE_CORRECTIONS = 3
+"""Corrections after which a point that is still not on its curve is left to the march."""
+
 AGREEMENT = 1e-6
 """Part of the terms by which redundant equations may contradict each other in the rates."""
 

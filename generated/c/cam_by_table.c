@@ -41,7 +41,9 @@ enum {
 // With _WHOLE_REGISTERS as many points are taken at a time as a register holds: what lies beyond the
 // last one is computed with them and never read. Then a compiler that vectorizes writes a loop once,
 // and not again for what would be left over: -O3 takes half the time.
-#if defined(_WHOLE_REGISTERS) && defined(__AVX__)
+#if defined(_WHOLE_REGISTERS) && defined(_WIDEST_REGISTERS)
+#define _abreast(count) (((count) + 7) & ~(size_t)7)
+#elif defined(_WHOLE_REGISTERS) && defined(__AVX__)
 #define _abreast(count) (((count) + 3) & ~(size_t)3)
 #elif defined(_WHOLE_REGISTERS) && (defined(__SSE2__) || defined(__aarch64__))
 #define _abreast(count) (((count) + 1) & ~(size_t)1)
@@ -630,6 +632,16 @@ _always_inline void copy(double *to, const double *from, size_t size, int is_far
     memcpy(to, from, size * sizeof *to);
 }
 
+// Fetch the place of the next strip, while that is computed.
+_always_inline void fetch(const double *to)
+{
+#ifdef __GNUC__
+    for (int k = 0; k < LANES; k += 8)
+        __builtin_prefetch(to + k, 1);
+#endif
+    (void)to;
+}
+
 // Copy rows to where they are wanted: all of them, or those listed.
 static inline void store_rows(cam_by_table_output to, double (*restrict rows)[LANES], const int *listed,
     int size, size_t start, size_t count, int is_far)
@@ -640,6 +652,8 @@ static inline void store_rows(cam_by_table_output to, double (*restrict rows)[LA
     for (int n = 0; to.point == 1 && count == LANES && n < size; n++) {
         const int i = listed ? listed[n] : n;
         copy(first + i * to.entry, rows[i], LANES, is_far);
+        if (!is_far)
+            fetch(first + i * to.entry + LANES);
     }
     for (size_t k = 0; !(to.point == 1 && count == LANES) && k < count; k++)
         for (int n = 0; n < size; n++) {
@@ -878,6 +892,10 @@ static const double RESIDUAL_FACTOR = 10.0, ROUNDING = 3.552713678800501e-15;
 static const double FARTHEST = 281474976.710656, SMALLEST_PART = 9.5367431640625e-07;
 // Part of its terms by which an equation of Phi_q x = b may miss its right side.
 static const double SOLVED = 1e-10;
+// Correction of a point on a curve between two others, in scales, up to which its rates are right, and
+// how many it may need.
+static const double ON_CURVE = 1e-13;
+enum { CURVE_CORRECTIONS = 3 };
 // The same of equations that repeat others, and which these are.
 static const double AGREEMENT = 1e-06;
 static const int IS_REDUNDANT[] = {
@@ -916,7 +934,7 @@ enum { MAX_CORRECTIONS = 6, MAX_SUBSTEPS = 10000 };
 // A good point of a motion: its numbers in the rows of a strip from t to determinants.
 enum { ROWS = offsetof(strip, F) / sizeof(double[LANES]) };
 typedef struct {
-    double t, rest[ROWS - 1];
+    double t, p[K > 0 ? K : 1], q[N], q_dot[N], q_ddot[N], determinants[BLOCKS > 0 ? BLOCKS : 1];
     line on;
     double ends[K > 0 ? K : 1];
 } state;
@@ -932,7 +950,7 @@ typedef struct {
 static void take_up(state *at, const strip *b, size_t k)
 {
     for (int i = 0; i < ROWS; i++)
-        (&at->t)[i] = ((const double *)b)[i * LANES + (int)k];
+        ((double *)at)[i] = ((const double *)b)[i * LANES + (int)k];
     at->on.is_led = b->on.is_led;
     if (_is_led(b)) {
         at->on = b->on;
@@ -946,7 +964,7 @@ static void put_at(strip *b, const state *at, size_t first, size_t end)
 {
     for (int i = 0; i < ROWS; i++)
         for (size_t k = first; k < end; k++)
-            ((double *)b)[(size_t)i * LANES + k] = (&at->t)[i];
+            ((double *)b)[(size_t)i * LANES + k] = ((const double *)at)[i];
     b->on.is_led = at->on.is_led;
     if (_is_led(at)) {
         b->on = at->on;
@@ -1110,9 +1128,9 @@ static void store(cam_by_table_output to, ptrdiff_t time, double (*rows)[LANES],
 // Whether a truth holds in any lane.
 static int any_lane(const double *truth, size_t count)
 {
-    double found = 0;
+    int64_t found = 0;
     for (size_t k = 0; k < count; k++)
-        found += truth[k];
+        found |= truth[k] != 0;
     return found != 0;
 }
 
@@ -1136,6 +1154,19 @@ typedef struct {
     double by_velocity[LANES];  // by how much velocities miss their equations, squared
     double by_acceleration[LANES];
 } outcome;
+
+// A motion between two good points: polynomials in the part of the time that is over.
+typedef struct {
+    double t;
+    double h;
+    double determinants[BLOCKS > 0 ? BLOCKS : 1];
+    double place[N];  // coefficients of the powers from 0 to 5
+    double first[N];
+    double second[N];
+    double third[N];
+    double fourth[N];
+    double fifth[N];
+} curve;
 
 // Where safeguarded attempts are.
 typedef struct {
@@ -1450,6 +1481,8 @@ static void record(const cam_by_table_variants *m, strip *b, const outcome *o, s
         m->residual[place] = o->is_over[k] ? NAN : o->residual[k];
         m->status[place] = o->status[k];
         m->iterations[place] = o->iterations[k];
+    }
+    for (size_t k = 0; k < count; k++)
         if (o->is_over[k]) {
             for (int i = 0; i < N; i++) {
                 m->q.first[i * m->q.entry + (ptrdiff_t)time * m->time
@@ -1460,7 +1493,6 @@ static void record(const cam_by_table_variants *m, strip *b, const outcome *o, s
                         + (ptrdiff_t)(first + k) * m->q_ddot.point] = NAN;
             }
         }
-    }
 }
 
 // Put variants at their guesses, at the first time, and measure their equations.
@@ -1494,6 +1526,105 @@ static void assemble(const cam_by_table_variants *m, strip *b, scales *s, size_t
     measure(b, m->size, s, count);
 }
 
+// Lay a curve from a good point to a lane, through their rates too (Hermite).
+_never_inline void lay(curve *c, const state *at, strip *b, size_t k)
+{
+    c->t = at->t;
+    c->h = b->t[k] - at->t;
+    for (int i = 0; i < BLOCKS; i++)
+        c->determinants[i] = at->determinants[i];
+    for (int i = 0; i < N; i++) {
+        const double speed = c->h * at->q_dot[i];
+        const double bow = 0.5 * c->h * c->h * at->q_ddot[i];
+        const double away = b->q[i][k] - at->q[i] - speed - bow;
+        const double gain = c->h * b->q_dot[i][k] - speed - 2.0 * bow;
+        const double turn = 0.5 * c->h * c->h * b->q_ddot[i][k] - bow;
+        c->place[i] = at->q[i];
+        c->first[i] = speed;
+        c->second[i] = bow;
+        c->third[i] = 10.0 * away - 4.0 * gain + turn;
+        c->fourth[i] = 7.0 * gain - 15.0 * away - 2.0 * turn;
+        c->fifth[i] = 6.0 * away - 3.0 * gain + turn;
+    }
+}
+
+// Put points on a curve, and correct them until the rates there are theirs. The last correction,
+// which changes no rates, is applied. Other branches are far from a smooth curve but at singular
+// configurations, which `complete` finds.
+_never_inline void put_on(const curve *c, const double *t, strip *b, const scales *s, outcome *o,
+    size_t lanes)
+{
+    const size_t all = _abreast(lanes);
+    double iterations[LANES] = { 0 };
+    double has_crossed[LANES] = { 0 };
+    double is_off[LANES] = { 0 };
+    double way[LANES] = { 0 };
+    for (size_t lane = 0; lane < lanes; lane++) {
+        is_off[lane] = 1;
+        b->t[lane] = t[lane];
+        way[lane] = (t[lane] - c->t) / c->h;
+    }
+    for (int i = 0; i < N; i++)
+        for (size_t lane = 0; lane < all; lane++) {
+            const double high = c->third[i]
+                + way[lane] * (c->fourth[i] + way[lane] * c->fifth[i]);
+            b->q[i][lane] = c->place[i]
+                + way[lane] * (c->first[i] + way[lane] * (c->second[i] + way[lane] * high));
+        }
+    for (int correction = 0; correction < CURVE_CORRECTIONS; correction++) {
+        if (!any_lane(is_off, lanes))
+            break;
+        for (size_t lane = 0; lane < all; lane++)
+            o->status[lane] = CAM_BY_TABLE_CONVERGED;
+        complete(b, s, o, lanes);
+        double change[N][LANES];
+        solve_of_strip(b->Phi_q, b->F, b->Phi, change, lanes);
+        for (size_t lane = 0; lane < all; lane++)
+            is_off[lane] = 0;
+        for (int i = 0; i < N; i++)
+            for (size_t lane = 0; lane < all; lane++) {
+                const double allowed = ON_CURVE * s->reference[i][lane]
+                    + ROUNDING * fabs(b->q[i][lane]);
+                b->q[i][lane] -= change[i][lane];
+                is_off[lane] = fabs(change[i][lane]) <= allowed ? is_off[lane] : 1;
+            }
+        for (size_t lane = 0; lane < all; lane++)
+            iterations[lane]++;
+    }
+    for (int i = 0; i < BLOCKS; i++) {
+        const double before = c->determinants[i];
+        for (size_t lane = 0; lane < all; lane++) {
+            const int stays = before > 0.0 ? b->determinants[i][lane] > 0.0
+                : b->determinants[i][lane] < 0.0;
+            has_crossed[lane] = stays ? has_crossed[lane] : 1;
+        }
+    }
+    for (size_t lane = 0; lane < all; lane++) {
+        o->iterations[lane] = (int)iterations[lane];
+        o->status[lane] = is_off[lane] != 0 || has_crossed[lane] != 0
+            ? CAM_BY_TABLE_NOT_CONVERGED : o->status[lane];
+    }
+}
+
+// Take a good point from lane to lane, and write the points on the way there. The lanes are LANES
+// times apart. Return to how many the curves led.
+_never_inline size_t fill(const cam_by_table_variants *m, strip *b, const scales *s, state *at,
+    strip *between, size_t done, size_t good)
+{
+    curve c;
+    outcome o = { 0 };
+    for (size_t k = 0; k < good; k++) {
+        lay(&c, at, b, k);
+        put_on(&c, m->t + done + k * LANES, between, s, &o, LANES);
+        for (size_t n = 0; n < LANES; n++)
+            if (o.status[n] != CAM_BY_TABLE_CONVERGED)
+                return k;
+        record(m, between, &o, 0, done + k * LANES, LANES);
+        take_up(at, b, k);
+    }
+    return good;
+}
+
 // Follow one motion; return how many points converged, from the first one on. The lanes are times
 // of the motion, as if each were a variant at its own: all have the same parameters, and what is
 // written for a variant is the time's.
@@ -1509,24 +1640,39 @@ static size_t march(const cam_by_table_variants *m)
     int status = o.status[0];
     size_t done = status == CAM_BY_TABLE_CONVERGED ? 1 : 0;
     size_t width = 1;
+    strip between;
+    constants_of_strip(&between, LANES);
+    keep(&between, &b);
     while (status == CAM_BY_TABLE_CONVERGED && done < m->count) {
-        const size_t count = m->count - done < width ? m->count - done : width;
+        size_t count = m->count - done < width ? m->count - done : width;
         size_t good = 0;
+        // Where points are dense the lanes are farther apart, with curves between them.
+        const size_t stride = count > LANES ? LANES : 1;
+        count = count / stride;
+        for (size_t k = 0; k < count; k++)
+            between.t[k] = m->t[done + (k + 1) * stride - 1];
         put_at(&b, &at, 0, count);
-        step(&b, &s, m->t + done, &o, count);
+        step(&b, &s, between.t, &o, count);
         while (good < count && o.status[good] == CAM_BY_TABLE_CONVERGED)
             good++;
+        if (stride > 1)
+            good = fill(m, &b, &s, &at, &between, done, good);
         if (good > 0) {
-            record(m, &b, &o, 0, done, good);
+            if (stride == 1)
+                record(m, &b, &o, 0, done, good);
             take_up(&at, &b, good - 1);
-            done += good;
+            done += good * stride;
             // The fewer iterations, the more points the next prediction can serve.
             if (good < count || o.iterations[good - 1] > 3) {
                 width = good > 1 ? good / 2 : 1;
+                width = width > good * stride / 2 ? width : good * stride / 2;
             } else {
-                width = 2 * width < LANES ? 2 * width : LANES;
+                // A curve over as many points as two corrections lead to needs one.
+                const int is_short = stride > 1 || o.iterations[good - 1] <= 2;
+                width = 2 * width < (is_short ? LANES * LANES : LANES) ? 2 * width
+                    : (is_short ? LANES * LANES : LANES);
             }
-        } else if (count > 1) {
+        } else if (count * stride > 1) {
             width = 1;
         } else {
             advance(&b, &s, &at, m->t[done], 0, &o);

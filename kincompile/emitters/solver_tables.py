@@ -8,6 +8,8 @@ from kincompile import criteria, quantities
 from kincompile.solver.vocabulary import (
     COUNTS,
     CRITERIA,
+    LANES_COUNTS,
+    LANES_CRITERIA,
     LINE_CRITERIA,
     SETS_COUNTS,
     SETS_CRITERIA,
@@ -24,10 +26,11 @@ NUMBERS: Mapping[str, float] = {
     name: getattr(criteria, name) for name in (*CRITERIA, *START_CRITERIA, *COUNTS, *START_COUNTS)
 }
 """The criteria of march and start by name; the counts are whole numbers."""
-OF_SETS: Mapping[str, float] = {
-    name: getattr(criteria, name) for name in (*SETS_CRITERIA, *LINE_CRITERIA, *SETS_COUNTS)
+OF_LANES: Mapping[str, float] = {
+    name: getattr(criteria, name)
+    for name in (*LANES_CRITERIA, *LANES_COUNTS, *SETS_CRITERIA, *LINE_CRITERIA, *SETS_COUNTS)
 }
-"""Those of many parameter sets besides."""
+"""Those of many points at once, and of many parameter sets, besides."""
 
 
 def solver_tables(program: Program) -> dict[str, Sequence[float]]:

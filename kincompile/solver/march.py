@@ -118,6 +118,7 @@ def record(m: Variants, b: Point, o: Outcome, time: Count, first: Count, count: 
         m.residual[place] = NOTHING if o.is_over[k] else o.residual[k]
         m.status[place] = o.status[k]
         m.iterations[place] = o.iterations[k]
+    for k in lanes(count):
         if o.is_over[k]:
             for i in range(N):
                 m.q[i, time, first + k] = NOTHING
@@ -150,6 +151,94 @@ def assemble(m: Variants, b: Point, s: Scales, first: Count, count: Count, o: Ou
     measure(b, m.size, s, lanes=count)
 
 
+if HAS_LANES:
+
+    class Curve(Struct):
+        """A motion between two good points: polynomials in the part of the time that is over."""
+
+        t: Real
+        h: Real
+        determinants: Row[BLOCKS]
+        place: Row[N]  # coefficients of the powers from 0 to 5
+        first: Row[N]
+        second: Row[N]
+        third: Row[N]
+        fourth: Row[N]
+        fifth: Row[N]
+
+    def lay(c: Curve, at: State, b: Point, k: Count):
+        """Lay a curve from a good point to a lane, through their rates too (Hermite)."""
+        c.t = at.t
+        c.h = b.t[k] - at.t
+        for i in range(BLOCKS):
+            c.determinants[i] = at.determinants[i]
+        for i in range(N):
+            speed = c.h * at.q_dot[i]
+            bow = 0.5 * c.h * c.h * at.q_ddot[i]
+            away = b.q[i][k] - at.q[i] - speed - bow
+            gain = c.h * b.q_dot[i][k] - speed - 2.0 * bow
+            turn = 0.5 * c.h * c.h * b.q_ddot[i][k] - bow
+            c.place[i] = at.q[i]
+            c.first[i] = speed
+            c.second[i] = bow
+            c.third[i] = 10.0 * away - 4.0 * gain + turn
+            c.fourth[i] = 7.0 * gain - 15.0 * away - 2.0 * turn
+            c.fifth[i] = 6.0 * away - 3.0 * gain + turn
+
+    @lanewise
+    def put_on(c: Curve, t: Lane, b: Point, s: Scales, o: Outcome):
+        """Put points on a curve, and correct them until the rates there are theirs.
+
+        The last correction, which changes no rates, is applied. Other branches are far from a
+        smooth curve but at singular configurations, which `complete` finds.
+        """
+        iterations: LaneInt = 0
+        is_off: LaneBool = True
+        has_crossed: LaneBool = False
+        b.t = t
+        way = (t - c.t) / c.h
+        for i in range(N):
+            high = c.third[i] + way * (c.fourth[i] + way * c.fifth[i])
+            b.q[i] = c.place[i] + way * (c.first[i] + way * (c.second[i] + way * high))
+        for correction in range(CURVE_CORRECTIONS):
+            if not any_lane(is_off):
+                break
+            o.status = CONVERGED
+            complete(b, s, o)
+            change = solve(b, b.Phi)
+            is_off = False
+            for i in range(N):
+                allowed = ON_CURVE * s.reference[i] + ROUNDING * abs(b.q[i])
+                b.q[i] -= change[i]
+                is_off = is_off | ~(abs(change[i]) <= allowed)
+            iterations += 1
+        for i in range(BLOCKS):
+            before = c.determinants[i]
+            stays = b.determinants[i] > 0.0 if before > 0.0 else b.determinants[i] < 0.0
+            has_crossed = has_crossed | ~stays
+        o.iterations = iterations
+        o.status = where(is_off | has_crossed, NOT_CONVERGED, o.status)
+
+    def fill(
+        m: Variants, b: Point, s: Scales, at: State, between: Point, done: Count, good: Count
+    ) -> Count:
+        """Take a good point from lane to lane, and write the points on the way there.
+
+        The lanes are LANES times apart. Return to how many the curves led.
+        """
+        c = Curve()
+        o = Outcome()
+        for k in range(good):
+            lay(c, at, b, k)
+            put_on(c, part(m.t, done + k * LANES), between, s, o, lanes=LANES)
+            for n in lanes(LANES):
+                if o.status[n] != CONVERGED:
+                    return k
+            record(m, between, o, 0, done + k * LANES, LANES)
+            take_up(at, b, k)
+        return good
+
+
 def march(m: Variants) -> Count:
     """Follow one motion; return how many points converged, from the first one on.
 
@@ -166,23 +255,46 @@ def march(m: Variants) -> Count:
     status: Int = o.status[0]
     done: Count = 1 if status == CONVERGED else 0
     width: Count = 1
+    if HAS_LANES:
+        between = Point()
+        constants(between, lanes=LANES)
+        keep(between, b)
     while status == CONVERGED and done < m.count:
         count = min(m.count - done, width)
         good: Count = 0
+        if HAS_LANES:
+            # Where points are dense the lanes are farther apart, with curves between them.
+            stride: Count = LANES if count > LANES else 1
+            count = count // stride
+            for k in lanes(count):
+                between.t[k] = m.t[done + (k + 1) * stride - 1]
         put_at(b, at, 0, count)
-        step(b, s, part(m.t, done), o, lanes=count)
+        step(b, s, between.t if HAS_LANES else part(m.t, done), o, lanes=count)
         while good < count and o.status[good] == CONVERGED:
             good += 1
+        if HAS_LANES:  # noqa: SIM102
+            if stride > 1:
+                good = fill(m, b, s, at, between, done, good)
         if good > 0:
-            record(m, b, o, 0, done, good)
+            if HAS_LANES:
+                if stride == 1:
+                    record(m, b, o, 0, done, good)
+            else:
+                record(m, b, o, 0, done, good)
             take_up(at, b, good - 1)
-            done += good
+            done += good * stride if HAS_LANES else good
             # The fewer iterations, the more points the next prediction can serve.
             if good < count or o.iterations[good - 1] > 3:
                 width = good // 2 if good > 1 else 1
+                if HAS_LANES:
+                    width = max(width, good * stride // 2)
+            elif HAS_LANES:
+                # A curve over as many points as two corrections lead to needs one.
+                is_short = stride > 1 or o.iterations[good - 1] <= 2
+                width = min(2 * width, LANES * LANES if is_short else LANES)
             else:
                 width = min(2 * width, LANES)
-        elif count > 1:
+        elif (count * stride if HAS_LANES else count) > 1:
             width = 1
         else:
             advance(b, s, at, m.t[done], 0, o)

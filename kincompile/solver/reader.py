@@ -36,7 +36,7 @@ from kincompile.solver.nodes import (
     Variable,
     While,
 )  # fmt: skip
-from kincompile.solver.vocabulary import CAREFUL, CONSTANTS
+from kincompile.solver.vocabulary import ABREAST, CHOICES, CONSTANTS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -50,18 +50,18 @@ MARCH, START, SETS = ("step", "walk", "march"), ("attempt", "start"), "sets"
 
 
 @cache
-def solver(*, is_careful: bool = False) -> Text:
-    """Return the march, read once: the plain one or the careful one."""
+def solver(*chosen: str) -> Text:
+    """Return the march, read once: as choices of `vocabulary.CHOICES` that hold make it."""
     text = Text({}, {})
     for name in MARCH:
-        text = read(source_of(name), text, is_careful=is_careful)
+        text = read(source_of(name), text, chosen)
     return text
 
 
 @cache
 def start() -> Text:
     """Return the start, read once."""
-    text = Text({"Point": solver().structs["Point"]}, {})
+    text = Text({"Point": read(source_of(MARCH[0])).structs["Point"]}, {})
     for name in START:
         text = read(source_of(name), text)
     return text
@@ -70,7 +70,7 @@ def start() -> Text:
 @cache
 def solver_of_sets() -> Text:
     """Return the plain march with what many parameter sets need, read once."""
-    return read(source_of(SETS), solver())
+    return read(source_of(SETS), solver(ABREAST))
 
 
 @cache
@@ -98,13 +98,13 @@ def source_of(name: str) -> str:
     return place_of(name).read_text(encoding="utf-8")
 
 
-def read(source: str, known: Text | None = None, *, is_careful: bool = False) -> Text:
+def read(source: str, known: Text | None = None, chosen: Collection[str] = ()) -> Text:
     """Return the structs and functions of a source; a `Refused` names what is not in it.
 
     Those of an earlier text may be used.
     """
     text = Text({**known.structs}, {**known.functions}) if known else Text({}, {})
-    tree, left_out = chosen(source, is_careful=is_careful)
+    tree, left_out = branches(source, chosen)
     comments = Comments(source, left_out)
     for item in tree.body:
         match item:
@@ -119,19 +119,20 @@ def read(source: str, known: Text | None = None, *, is_careful: bool = False) ->
     return text
 
 
-def chosen(source: str, *, is_careful: bool) -> tuple[ast.Module, set[int]]:
-    """Return the text of one of the two marches, and the lines that are the other's."""
-    choice = _Chosen(source, is_careful)
+def branches(source: str, chosen: Collection[str]) -> tuple[ast.Module, set[int]]:
+    """Return a text for the choices that hold, and the lines that are left out."""
+    choice = _Branches(source, chosen)
     return choice.visit(ast.parse(source)), choice.left_out
 
 
-class _Chosen(ast.NodeTransformer):
-    """Puts in place of an `if IS_CAREFUL` the branch that is meant, and notes the other's lines."""
+class _Branches(ast.NodeTransformer):
+    """Puts in place of an `if` of a choice what is meant, and notes the lines of the rest."""
 
-    def __init__(self, source: str, is_careful: bool) -> None:
-        self.is_careful = is_careful
+    def __init__(self, source: str, chosen: Collection[str]) -> None:
+        self.chosen = chosen
         self.left_out: set[int] = set()
-        self.asked = [k for k, line in enumerate(source.splitlines(), 1) if CAREFUL in line]
+        lines = enumerate(source.splitlines(), 1)
+        self.asked = [k for k, line in lines if any(x in line for x in CHOICES)]
 
     def visit(self, node: ast.AST) -> Any:
         """Return a node; one that asks nothing as it is, which saves half of the reading."""
@@ -143,10 +144,10 @@ class _Chosen(ast.NodeTransformer):
     def visit_If(self, node: ast.If) -> Any:
         """Return a branch, or its chosen statements."""
         self.generic_visit(node)
-        if ast.unparse(node.test) != CAREFUL:
+        if ast.unparse(node.test) not in CHOICES:
             return node
         end = node.body[-1].end_lineno or node.lineno
-        if self.is_careful:
+        if ast.unparse(node.test) in self.chosen:
             self.left_out |= set(range(end + 1, (node.end_lineno or end) + 1))
             return node.body
         self.left_out |= set(range(node.lineno, end + 1))
@@ -155,9 +156,9 @@ class _Chosen(ast.NodeTransformer):
     def visit_IfExp(self, node: ast.IfExp) -> Any:
         """Return a choice, or the value that is meant."""
         self.generic_visit(node)
-        if ast.unparse(node.test) != CAREFUL:
+        if ast.unparse(node.test) not in CHOICES:
             return node
-        return node.body if self.is_careful else node.orelse
+        return node.body if ast.unparse(node.test) in self.chosen else node.orelse
 
 
 class Comments:

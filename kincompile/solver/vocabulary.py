@@ -57,6 +57,10 @@ SETS_COUNTS = ("INVERSE_ITERATIONS",)
 LINE_CRITERIA = ("FIRST_DIFFERENCE", "SECOND_DIFFERENCE")
 """Those that attempts of many sets are judged by besides; and steps along a line of parameters."""
 
+LANES_CRITERIA = ("ON_CURVE",)
+LANES_COUNTS = ("CURVE_CORRECTIONS",)
+"""Those that points on curves between others are judged by."""
+
 CAREFUL_COUNTS = ("MAX_ITERATIONS", "PATIENCE")
 CAREFUL_CRITERIA = ("ALLOWED_PART", "LARGE_ERROR", "SINGULAR_SENSITIVITY", "TINY")
 """Those that the careful march judges by besides; and STEEP."""
@@ -69,8 +73,9 @@ TRANSMISSION_CRITERIA = (
 )  # fmt: skip
 """Those that a transmission judges by."""
 
-CAREFUL = "IS_CAREFUL"
-"""Chooses, where the text is read, which of two marches it is."""
+CAREFUL, ABREAST = CHOICES = ("IS_CAREFUL", "HAS_LANES")
+"""Choose, where the text is read, which of two marches it is, and whether that takes many points at
+once, which pays for a coarse march with curves between."""
 
 TABLES = {
     "ANGULAR": Type("bool", ("N",)),
@@ -88,9 +93,9 @@ inputs of a transmission are angles."""
 
 CONSTANTS = (
     dict.fromkeys((*SIZES, *ROOM, *STATUSES, *COUNTS, *START_COUNTS, *CAREFUL_COUNTS), INT)
-    | dict.fromkeys(SETS_COUNTS, INT)
+    | dict.fromkeys((*SETS_COUNTS, *LANES_COUNTS), INT)
     | dict.fromkeys((*CRITERIA, *START_CRITERIA, *CAREFUL_CRITERIA, *TRANSMISSION_CRITERIA), REAL)
-    | dict.fromkeys(SETS_CRITERIA, REAL)
+    | dict.fromkeys((*SETS_CRITERIA, *LANES_CRITERIA), REAL)
     | dict.fromkeys(("NOTHING", "INFINITE", "TURN"), REAL)
     | TABLES
 )

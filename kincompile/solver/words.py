@@ -54,8 +54,9 @@ def on_numpy(mechanism: Mechanism, *, is_careful: bool = False) -> ModuleType:
     kernels, words = _Kernels(mechanism), (*vocabulary.KERNELS, "solve", "missed", "lead")
     own = {name: getattr(kernels, name) for name in words}
     texts = reader.MARCH if is_careful else (*reader.MARCH, reader.SETS)
-    march = _copy_of(texts, {}, is_careful=is_careful)
-    start = _copy_of(reader.START, vars(march), is_careful=is_careful)
+    chosen = vocabulary.CAREFUL if is_careful else vocabulary.ABREAST
+    march = _copy_of(texts, {}, chosen)
+    start = _copy_of(reader.START, vars(march), chosen)
     for text in (march, start):
         vars(text).update(**sizes, **mechanism.tables, **own)
     for struct in vars(start).values():
@@ -64,13 +65,13 @@ def on_numpy(mechanism: Mechanism, *, is_careful: bool = False) -> ModuleType:
     return start
 
 
-def _copy_of(parts: Sequence[str], known: Mapping[str, Any], *, is_careful: bool) -> ModuleType:
+def _copy_of(parts: Sequence[str], known: Mapping[str, Any], chosen: str) -> ModuleType:
     """Return a module of its own for a text, which has known names besides."""
     module = ModuleType(f"kincompile.solver.{parts[-1]}")
     vars(module).update({name: x for name, x in known.items() if not name.startswith("_")})
     modules = {f"kincompile.solver.{x}" for x in (*reader.MARCH, *reader.START, reader.SETS)}
     for name in parts:
-        tree, _ = reader.chosen(reader.source_of(name), is_careful=is_careful)
+        tree, _ = reader.branches(reader.source_of(name), [chosen])
         # What stands in another module of the texts is there already, for this mechanism.
         tree.body = [x for x in tree.body if getattr(x, "module", None) not in modules]
         exec(compile(tree, str(reader.place_of(name)), "exec"), vars(module))
@@ -282,7 +283,7 @@ copied, where, finite, lanes, floor, sqrt = np.copy, np.where, np.isfinite, rang
 NOTHING, INFINITE, TURN = np.nan, np.inf, 2 * np.pi
 CONVERGED, NOT_CONVERGED, SINGULAR, NOT_FINITE, NOT_REACHED, LOCK_UP = vocabulary.STATUSES.values()
 
-IS_CAREFUL = False
+IS_CAREFUL = HAS_LANES = False
 
 # Until a mechanism gives its own:
 N = M = K = U = X = ONE = LANES = NONZEROS = BLOCKS = NORMAL = TALL = WIDE = 0

@@ -45,7 +45,9 @@ PUBLIC = (
     "march_variants", "follow_variants", "attempt_variants", "mirror_variants", "lead_variants"
 )  # fmt: skip
 """Functions that the header declares."""
-APART = ("weigh", "eliminate", "substitute", "direct", "descend", "mirror")
+APART = (
+    "lay", "put_on", "fill", "weigh", "eliminate", "substitute", "direct", "descend", "mirror"
+)  # fmt: skip
 """Functions that a compiler need not put in line: they would take it a second."""
 OF_SETS = "put_to_rest"
 """The first function of many parameter sets: who needs none leaves it out, and all after it."""

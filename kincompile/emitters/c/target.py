@@ -20,7 +20,7 @@ from kincompile.emitters.constants import items, named_lists
 from kincompile.emitters.lines import WIDTH, indented, wrapped
 from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.printer import ELEMENTARY
-from kincompile.emitters.solver_tables import NUMBERS, OF_SETS, solver_tables
+from kincompile.emitters.solver_tables import NUMBERS, OF_LANES, solver_tables
 from kincompile.quantities import nonzeros_of
 from kincompile.report.templates import fill
 from kincompile.solver.reader import solver_of_sets, start
@@ -313,5 +313,5 @@ def _march(program: Program) -> dict[str, str]:
         name: _array_lines(items(values, ("0", "1")))
         for name, values in solver_tables(program).items()
     }
-    numbers = {name: repr(x) for name, x in {**NUMBERS, **OF_SETS}.items()}
+    numbers = {name: repr(x) for name, x in {**NUMBERS, **OF_LANES}.items()}
     return {**tables, **_solver(program.name), **numbers}

@@ -27,6 +27,7 @@ from kincompile.emitters.planned_solve import schedule_solve
 from kincompile.emitters.solver_tables import solver_tables
 from kincompile.report.templates import fill, read
 from kincompile.solver.reader import solver, start
+from kincompile.solver.vocabulary import CAREFUL
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -154,8 +155,7 @@ def _parts() -> dict[str, str]:
     """Return what is the same for every mechanism: the parts, and the criteria that they use."""
     printed = {
         START: "/* ---- a position from a guess ---- */\n\n" + JavaScriptSolver(start()).text(),
-        MARCH: "/* ---- from time to time ---- */\n\n"
-        + JavaScriptSolver(solver(is_careful=True)).text(),
+        MARCH: "/* ---- from time to time ---- */\n\n" + JavaScriptSolver(solver(CAREFUL)).text(),
     }
     parts = "\n".join(printed.get(x) or read(f"javascript/{x}") for x in PARTS)
     used = set(re.findall(r"\b[A-Z_]+\b", parts)) & vars(criteria).keys()

@@ -7,6 +7,7 @@ import pytest
 from kincompile.solver.expressions import Refused
 from kincompile.solver.nodes import LANE, Comment, Name, variables_in
 from kincompile.solver.reader import MARCH, read, solver, source_of
+from kincompile.solver.vocabulary import ABREAST, CAREFUL
 
 TEXT = "".join(map(source_of, MARCH))
 
@@ -103,12 +104,13 @@ CHOICE = """    for i in range(N):
 def test_that_a_choice_of_march_leaves_one_branch_and_its_comments():
     head, _, rest = TEXT.partition("    for i in range(N):\n        speed = abs(b.q_dot")
     text = head + CHOICE + rest[rest.index("    return most") :]
-    for is_careful, comment in ((False, "It is the largest."), (True, "The last one serves.")):
-        loop: Any = read(text, is_careful=is_careful).functions["speed_of"].body[1]
+    for chosen, comment in (((), "It is the largest."), ((CAREFUL,), "The last one serves.")):
+        loop: Any = read(text, chosen=chosen).functions["speed_of"].body[1]
         assert loop.body[1] == Comment((comment,))
-        assert isinstance(loop.body[2].value, Name) == is_careful
-    plain, careful = solver(), solver(is_careful=True)
+        assert isinstance(loop.body[2].value, Name) == bool(chosen)
+    plain, careful = solver(), solver(CAREFUL)
     assert "advance_carefully" in careful.functions.keys() - plain.functions.keys()
+    assert "put_on" in solver(ABREAST).functions.keys() - plain.functions.keys()
     assert "is_there" in careful.structs["Outcome"].fields.keys() - plain.structs["Outcome"].fields
 
 
