@@ -45,9 +45,9 @@ FLAGS = (
 """None of these changes what a program may assume of floating-point numbers, NaN included."""
 
 WIDEST, SINCE = ("-mprefer-vector-width=512", "-D_WIDEST_REGISTERS"), "avx512_vbmi2"
-"""Flags for registers of eight numbers, of which compilers use half by themselves, and by what the
-processors are known that do not slow down for them (Intel since 2019, AMD since 2022): motions take
-0.8 of the time."""
+"""Flags for registers of eight numbers, of which compilers use half by themselves, and a mark of
+processors that run them at full speed (Intel since 2019, AMD since 2022): motions take 0.8 of the
+time."""
 
 OWN = ("-D_WITHOUT_START",)
 """Flags of the runtime's libraries: it has a start of its own."""
