@@ -469,7 +469,7 @@ def size_of(
 def rounded(values: Any) -> NDArray[np.float64]:
     """Return scales with seven digits: all forms of a module then judge by the same numbers."""
     parts, exponents = np.frexp(values)
-    return np.asarray(np.ldexp(np.round(parts * 2.0**24) / 2.0**24, exponents))
+    return np.asarray(np.ldexp(np.rint(parts * 2.0**24) / 2.0**24, exponents))
 
 
 SMALL_PART, CONSTANT = 1e-8, 1e-12

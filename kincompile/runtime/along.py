@@ -19,7 +19,8 @@ from kincompile.criteria import (
     MAX_CORRECTIONS,
     SECOND_DIFFERENCE,
 )
-from kincompile.runtime.engine.linear import Dense, Planned, Sparse
+from kincompile.runtime.engine.linear import Dense, Planned
+from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.lanes import Lanes, take_on
 from kincompile.runtime.march import March, State
 from kincompile.runtime.status import Status

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from kincompile.criteria import OTHER_SIZE, RESIDUAL_FACTOR, SMALL_ERROR, TOO_NEAR
-from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense, Sparse
+from kincompile.runtime.engine.code import Kind
+from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense
 from kincompile.runtime.engine.scales import Point
+from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.grid import solve_grid
 from kincompile.runtime.march import CORRECTIONS_ON_GRID, March, Outcome, State
 from kincompile.runtime.singular.events import ended, singular_start
@@ -29,6 +31,10 @@ if TYPE_CHECKING:
     from kincompile.runtime.singular.events import Event, Passage
 
     Progress: TypeAlias = Callable[[int, int], object]
+
+
+START: Kind[tuple[object, Outcome, March]] = Kind("start")
+"""The last start of a module, with what it depends on: motions often begin at the same time."""
 
 
 @dataclass(slots=True, eq=False)
@@ -159,18 +165,31 @@ class _Continuation:
         self._progress = progress or (lambda done, total: None)
 
     def start(self) -> Outcome:
-        """Assemble the mechanism at the first time."""
+        """Assemble the mechanism at the first time; a module keeps its last start."""
+        inputs, made = self._inputs, self._inputs.code.made
+        limits, given = (inputs.tolerance, inputs.max_iterations), (inputs.p, inputs.guess)
+        key = inputs.code, float(self._times[0]), *limits, *(x.tobytes() for x in given)
+        known = made.get((START, None))
+        if known is None or known[0] != key:
+            known = key, self._assembled(), self._march
+            if not inputs.code.blocks:  # whose engine counts its solves
+                made[START, None] = known
+        _, outcome, self._march = known
+        self._put(outcome)
+        self._motion.is_folded = outcome.is_folded
+        if outcome.position is not None and (self._times.size > 1 or not outcome.is_plain):
+            # The guess may be rough: from here on the assembled mechanism gives the size.
+            self._march = self._march_at(outcome.position.q, self._march.engine)
+        return outcome
+
+    def _assembled(self) -> Outcome:
+        """Return the start from the guess."""
         inputs, time = self._inputs, float(self._times[0])
         self._march = self._march_at(inputs.guess, None)
         outcome = start(self._march, time, inputs)
         if self._is_sparse and outcome.state is None:
             self._leave_blocks(inputs.guess)
             outcome = start(self._march, time, inputs)
-        self._put(outcome)
-        self._motion.is_folded = outcome.is_folded
-        if outcome.position is not None:
-            # The guess may be rough: from here on the assembled mechanism gives the size.
-            self._march = self._march_at(outcome.position.q, self._march.engine)
         return outcome
 
     def doubt(self, outcome: Outcome) -> str:
@@ -185,7 +204,8 @@ class _Continuation:
         Where anything did not, the careful march finds out what it is, from the first time on.
         """
         motion, inputs, point = self._motion, self._inputs, outcome.position
-        if inputs.code.march is None or outcome.status is not Status.CONVERGED or point is None:
+        goes_on = inputs.t.size > 1 and outcome.status is Status.CONVERGED
+        if inputs.code.march is None or not goes_on or point is None:
             return False
         is_whole = motion.march_compiled(inputs, self._march, point.q)
         if not is_whole:

@@ -12,7 +12,7 @@ step is halved, and doubled again once it succeeds.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import mul, sub
 from typing import TYPE_CHECKING, Any
@@ -74,6 +74,11 @@ class Outcome:
     is_folded: bool = False  # whether the guess that it was assembled from shows no branch
     other: Point | None = None  # another assembly that is as near to that guess
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether it converged, and nothing more is to be said of it."""
+        return self.status is Status.CONVERGED and not self.left_branch and self.other is None
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Corrected:
@@ -107,6 +112,10 @@ class March:
         """Return the march of a mechanism, whose scales are those at a position."""
         equations = problem(code, p, q, t, sparse=True, engine=engine)
         return cls(equations, equations.engine, tolerance)
+
+    def with_engine(self, engine: Linear) -> March:
+        """Return the march with another engine for the same equations."""
+        return March(replace(self.equations, engine=engine), engine, self._asked)
 
     @property
     def scales(self) -> tuple[float, float]:

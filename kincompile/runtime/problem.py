@@ -23,8 +23,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from kincompile import criteria
-from kincompile.runtime.engine.linear import Dense, Sparse, unsolvable
+from kincompile.runtime.engine.linear import Dense, unsolvable
 from kincompile.runtime.engine.scales import Scales, converges_linearly, norm, weights_of
+from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:

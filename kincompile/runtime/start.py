@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile import criteria
-from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense, Planned, stacked
-from kincompile.runtime.engine.scales import converges_linearly
+from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense, Floats, Planned, stacked
+from kincompile.runtime.engine.scales import converges_linearly, norm
 from kincompile.runtime.march import March, Outcome
-from kincompile.runtime.problem import Attempt, iterate, safeguarded_step
+from kincompile.runtime.problem import Attempt, iterate, plain_step, safeguarded_step
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -30,31 +31,54 @@ if TYPE_CHECKING:
 
 
 def start(march: March, t: float, inputs: Inputs, *, is_in_vain: bool = False) -> Outcome:
-    """Assemble the mechanism at the first time, from the guess."""
-    limits = inputs.tolerance, inputs.max_iterations
-    attempt = assemble(march.equations, t, inputs.guess, *limits, is_in_vain=is_in_vain)
-    iterations = len(attempt.corrections)
+    """Assemble the mechanism at the first time, from the guess.
+
+    Where Newton's own steps settle near it, floats do, and matrices have no more to say.
+    """
+    limits, equations = (inputs.tolerance, inputs.max_iterations), march.equations
+    if equations.code.lanes is not None and not equations.code.redundant:
+        floats = march.with_engine(Floats(equations.code, equations.p))
+        near = partial(_near_step, most=norm(equations.near))
+        attempt = iterate(floats.equations, t, inputs.guess, *limits, near)
+        if attempt.status is Status.CONVERGED and is_settled(floats.equations, attempt.points):
+            outcome = _started(floats, attempt, *attempt.points[:: len(attempt.points) - 1])
+            point = equations.at(attempt.last.q, t)
+            if outcome.state is not None and point is not None:
+                return replace(outcome, position=point, state=replace(outcome.state, point=point))
+    attempt = assemble(equations, t, inputs.guess, *limits, is_in_vain=is_in_vain)
     if attempt.status is not Status.CONVERGED:
         status = attempt.status
         status = Status.NOT_ASSEMBLED if status is Status.NOT_CONVERGED else status
-        return Outcome(status, iterations, None, nearest=attempt.found)
+        return Outcome(status, len(attempt.corrections), None, nearest=attempt.found)
     guess, point = attempt.points[0], attempt.last
-    if attempt.equations is not march.equations or guess.q is not inputs.guess:
-        here = [march.equations.at(q, t) for q in (inputs.guess, point.q)]
+    if attempt.equations is not equations or guess.q is not inputs.guess:
+        here = [equations.at(q, t) for q in (inputs.guess, point.q)]
         guess, point = (known for known in here if known is not None)
-    left = leaves_branch(march.equations, guess, point)
+    return _started(march, attempt, guess, point)
+
+
+def _near_step(
+    equations: Problem, t: float, point: Point, most: float
+) -> tuple[Point, float] | Status:
+    """Apply the whole correction, unless it leads too far to settle near a guess."""
+    outcome = plain_step(equations, t, point)
+    is_far = not isinstance(outcome, Status) and outcome[1] > most
+    return Status.NOT_CONVERGED if is_far else outcome
+
+
+def _started(march: March, attempt: Attempt, guess: Point, point: Point) -> Outcome:
+    """Return the position that an attempt found from a guess as the start of a motion."""
     folded = is_folded(march.equations, guess, point)
+    left = not folded and _is_on_another(march.equations, guess, point)
     state = march.state(point)
     # Towards a singular position Newton's method creeps, and ends a rounding error before it.
     if not isinstance(state, Status) and converges_linearly(attempt.corrections):
         state = Status.SINGULAR if state.sensitivity > criteria.TOO_NEAR else state
-    found = Outcome(
-        Status.CONVERGED, iterations, None, point,
+    found = state if isinstance(state, Status) else Status.CONVERGED
+    return Outcome(
+        found, len(attempt.corrections), None if isinstance(state, Status) else state, point,
         left_branch=left, is_folded=folded, other=attempt.other,
     )  # fmt: skip
-    if isinstance(state, Status):
-        return replace(found, status=state)
-    return replace(found, state=state)
 
 
 def give_up(
@@ -95,6 +119,8 @@ def assemble(
     is made.
     """
     limits = tolerance, max_iterations
+    if isinstance(equations.engine, Dense):
+        equations = _careful(equations)
     plain = iterate(equations, t, guess, *limits)
     found = plain.status is Status.CONVERGED
     if not plain.points or (found and is_settled(equations, plain.points)):
@@ -106,10 +132,7 @@ def assemble(
             attempt.turned = unwound(equations, t, attempt.last, guess, tolerance)
         return attempt
     if not _is_careful(equations):
-        # Where Newton's method throws an iterate far, the last digit decides where it ends: so it
-        # has to be the same in all forms of a module.
-        careful = replace(equations, engine=Dense(equations.code, equations.p, is_written=True))
-        return assemble(careful, t, guess, *limits, is_in_vain=is_in_vain)
+        return assemble(_careful(equations), t, guess, *limits, is_in_vain=is_in_vain)
     if is_in_vain and not found:
         plain.status = Status.NOT_CONVERGED
         return plain
@@ -216,6 +239,18 @@ def restart_points(equations: Problem, guess: Array) -> list[Array]:
     return [guess, *(guess + nudge for nudge in nudges)]
 
 
+def _careful(equations: Problem) -> Problem:
+    """Return equations with dense matrices and code in Python.
+
+    Where Newton's method throws an iterate far, the last digit decides where it ends: so it has to
+    be the same in all forms of a module.
+    """
+    engine = equations.engine
+    if isinstance(engine, Dense) and engine.is_written:
+        return equations
+    return replace(equations, engine=Dense(equations.code, equations.p, is_written=True))
+
+
 def _is_careful(equations: Problem) -> bool:
     """Say whether matrices are dense and code is in Python, or the mechanism too large for it."""
     is_written = isinstance(equations.engine, Dense) and equations.engine.is_written
@@ -232,9 +267,13 @@ def left_branch(equations: Problem, guess: Point, found: Point) -> bool:
 
 def leaves_branch(equations: Problem, guess: Point, found: Point) -> bool:
     """Say whether a guess shows a branch, and a position found from it lies on another."""
+    return not is_folded(equations, guess, found) and _is_on_another(equations, guess, found)
+
+
+def _is_on_another(equations: Problem, guess: Point, found: Point) -> bool:
+    """Say whether a position is on another branch than a guess, which shows one."""
     wanted = equations.engine.signs(guess)
-    shows = all(wanted) and not is_folded(equations, guess, found)
-    return shows and equations.engine.signs(found) != wanted
+    return all(wanted) and equations.engine.signs(found) != wanted
 
 
 def is_folded(equations: Problem, guess: Point, found: Point) -> bool:
@@ -248,10 +287,9 @@ def is_settled(equations: Problem, way: Sequence[Point]) -> bool:
 
     In compiled code it must not have gone far: where it ends then, rounding would decide.
     """
-    away = np.abs(way[-1].q - way[0].q) / equations.near
-    return bool(away.max() <= criteria.SETTLED) and (
-        _is_careful(equations) or not is_thrown(equations, way)
-    )
+    away = np.abs(np.array([point.q for point in way]) - way[0].q) / equations.near
+    is_near = bool((away[-1] <= criteria.SETTLED).all())
+    return is_near and (_is_careful(equations) or bool((away <= criteria.THROWN).all()))
 
 
 def is_thrown(equations: Problem, way: Sequence[Point]) -> bool:

@@ -83,8 +83,8 @@ class Compiled:
     bodies: tuple[tuple[str, int, int], ...]
     # Row, column and, where it never changes, the number of each entry of Phi_q.
     entries: tuple[tuple[int, int, float | None], ...]
-    # (m, n): those that never change, in a matrix
-    constant: Array
+    # (nnz,): those that never change, NaN for the others
+    numbers: Array
     # By column, the others: the row of each, and its number among all that vary.
     varying: tuple[tuple[int, tuple[tuple[int, int], ...]], ...]
     # Bodies whose guess is zero throughout, as it is where none is given.
@@ -332,7 +332,7 @@ def read(module: ModuleType, written: Callable[..., Any] | None = None) -> Compi
         outputs=names.get("OUTPUTS", ()),
         bodies=bodies,
         entries=entries,
-        constant=_constant(entries, len(names["EQUATIONS"]), len(coordinates)),
+        numbers=np.array([number for *_, number in entries], dtype=np.float64),
         varying=_varying(entries),
         without_guess=tuple(body for body, k, n in bodies if not any(given[k : k + n])),
         angular=np.array(quantities.turning(units, places), dtype=bool),
@@ -404,16 +404,6 @@ def _entries(names: Mapping[str, Any]) -> tuple[tuple[int, int, float | None], .
         numbers = dict(zip(names["_FIXED"].tolist(), numbers.tolist(), strict=True))
     places = names["PATTERN"].tolist() if "LANES" in names else ()
     return tuple((row, column, numbers.get(k)) for k, (row, column) in enumerate(places))
-
-
-def _constant(
-    entries: Sequence[tuple[int, int, float | None]], equations: int, coordinates: int
-) -> Array:
-    """Return the entries of Phi_q that never change as a matrix."""
-    matrix = np.zeros((equations, coordinates) if entries else (0, 0))
-    for row, column, number in entries:
-        matrix[row, column] = number or 0.0
-    return matrix
 
 
 def _varying(

@@ -17,7 +17,8 @@ from kincompile.errors import InputError
 from kincompile.html import Tabled, picture_html
 from kincompile.names import listed
 from kincompile.runtime.engine.code import code_of
-from kincompile.runtime.engine.linear import Dense, Planned, Sparse
+from kincompile.runtime.engine.linear import Dense, Planned
+from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.problem import problem
 from kincompile.runtime.results.columns import MotionTable
 from kincompile.runtime.results.html import solution_html

@@ -10,12 +10,18 @@ import sympy
 
 import kincompile as kc
 from kincompile.runtime.engine.code import POINTS, SENSITIVE, code_of
-from kincompile.runtime.engine.linear import Dense, Linear, Planned, Sparse
+from kincompile.runtime.engine.linear import Dense, Floats, Linear, Planned
 from kincompile.runtime.engine.scales import Point
+from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.load import from_source
 from kincompile.runtime.problem import problem
 
-ENGINES: dict[str, Any] = {"dense": Dense, "planned": Planned, "sparse": Sparse}
+ENGINES: dict[str, Any] = {
+    "dense": Dense,
+    "floats": Floats,
+    "planned": Planned,
+    "sparse": Sparse,
+}
 KINDS = tuple(ENGINES)
 TIME = 0.3
 
@@ -24,7 +30,12 @@ TIME = 0.3
 def modules(example_named):
     model = example_named("four_bar").model
     inline = example_named("four_bar").module
-    return {"dense": inline, "planned": inline, "sparse": kc.compile(model, form="grouped")}
+    return {
+        "dense": inline,
+        "floats": inline,
+        "planned": inline,
+        "sparse": kc.compile(model, form="grouped"),
+    }
 
 
 def evaluated(module: Any, kind: str) -> tuple[Linear, Point, np.ndarray]:

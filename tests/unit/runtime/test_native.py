@@ -260,7 +260,7 @@ def test_coarse_and_fine_grids_agree_with_the_careful_march(four_bar, points, ba
     native, module = four_bar
     times = np.linspace(0, 4.0, points)[:: -1 if backwards else 1]
     found, expected = kc.solve(native, times), kc.solve(module, times, method="march")
-    assert found.statistics.get("compiled") == points
+    assert found.statistics.get("compiled", 1) == points  # of one time there is but a start
     for name in ("q", "q_dot", "q_ddot"):
         np.testing.assert_allclose(
             getattr(found, name), getattr(expected, name), rtol=1e-11, atol=1e-11

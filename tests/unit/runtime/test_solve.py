@@ -1,3 +1,4 @@
+import itertools
 import math
 import warnings
 
@@ -6,6 +7,7 @@ import pytest
 
 import kincompile as kc
 from kincompile.errors import AssemblyWarning, SolveError
+from kincompile.runtime.engine.code import code_of
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.solve import solve
 from kincompile.runtime.status import Status
@@ -228,6 +230,36 @@ def test_parameters_and_guesses_come_as_vectors_or_by_name(pendulum):
     np.testing.assert_array_equal(by_name.q, vector.q)
     assert by_name["phi_rod"][0] == pytest.approx(math.pi / 2 + 1.5)
     assert by_name.parameters == {"omega": 3.0, "phi_0": math.pi / 2}
+
+
+def test_the_start_that_a_module_keeps_is_of_what_it_depends_on(four_bar):
+    far = kc.newton(four_bar, 0.7, None).q + 0.5
+    given = [{}, {"p": {"a": 9.0}}, {"guess": far}, {"max_iterations": 9}, {"tolerance": 0.1}]
+    times = (0.0, 0.7, np.linspace(0.7, 1, 3), 0.7)
+    for t, own in itertools.product(times, (*given, *given[::-1])):
+        kept = [solve(four_bar, t, **own) for _ in range(2)]
+        code_of(four_bar).made.clear()
+        fresh = solve(four_bar, t, **own)
+        for found in kept:
+            assert found.message == fresh.message
+            for name in ("q", "q_dot", "q_ddot", "status", "residual", "iterations"):
+                np.testing.assert_array_equal(getattr(found, name), getattr(fresh, name))
+            found.q[:] = 7.0  # it is the caller's
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, math.pi / 2, 2.0, math.pi, 5.0])
+def test_a_start_on_floats_is_that_of_matrices(four_bar, angle, monkeypatch):
+    t = angle / four_bar.DEFAULTS[-1]
+    near = kc.newton(four_bar, t, None).q + 0.01
+    found = solve(four_bar, t, guess=near)
+    monkeypatch.setattr("kincompile.runtime.start.is_settled", lambda *_: False)
+    code_of(four_bar).made.clear()
+    with_care = solve(four_bar, t, guess=near)
+    assert found.success
+    for name in ("q", "q_dot", "q_ddot"):
+        np.testing.assert_allclose(
+            getattr(found, name), getattr(with_care, name), rtol=1e-12, atol=1e-11
+        )
 
 
 def test_progress_counts_the_points(pendulum):
