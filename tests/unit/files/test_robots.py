@@ -62,12 +62,8 @@ def test_that_frames_are_those_of_the_oracle(name: str) -> None:
                 assert (turn[0] * expected.inv()).magnitude() < 1e-9, link
 
 
-@pytest.mark.parametrize(
-    "name", [SMALL[0], *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE[:-1])]
-)
-def test_that_the_loops_are_closed_from_the_zero_pose(name: str) -> None:
-    """The frames of each pair of the sidecar coincide, though the file's own pose is open."""
-    m = kc.read(DATA / f"{name}.urdf")
+def drawn_frames(m: spatial.Mechanism) -> dict[str, Any]:
+    """Return the placement (4, 4) of each link in the guess of a mechanism."""
     places = {"ground": np.eye(4)}
     for body in m.bodies:
         place = places[body.name] = np.eye(4)
@@ -75,7 +71,85 @@ def test_that_the_loops_are_closed_from_the_zero_pose(name: str) -> None:
         place[:3, :3] = Rotation.from_quat(
             np.roll([float(p) for p in body.guess[3:]], -1)
         ).as_matrix()
-    frames = {link: places[body] @ place for link, (body, place) in m.links.items()}
+    return {link: places[body] @ place for link, (body, place) in m.links.items()}
+
+
+def about(axis: Any, angle: float) -> Any:
+    """Return the matrix of a turn, by the formula of Rodrigues."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def random_tree(seed: int) -> tuple[str, list[dict[str, Any]]]:
+    """Return a tree as a URDF, and its joints in an order from the root."""
+    rng = np.random.default_rng(seed)
+    joints, texts = list[dict[str, Any]](), list[str]()
+    for k in range(int(rng.integers(2, 9))):
+        axis = rng.standard_normal(3) * rng.uniform(0.1, 10)
+        r, angles = rng.uniform(-1, 1, 3), rng.uniform(-4, 4, 3)
+        kind = str(rng.choice(["revolute", "continuous", "prismatic", "fixed"]))
+        parent = f"link {rng.integers(k + 1)}"
+        roll, pitch, yaw = map(about, np.eye(3), angles)
+        joints.append({
+            "name": f"joint-{k}", "kind": kind, "parent": parent, "child": f"link {k + 1}",
+            "r": r, "turn": yaw @ pitch @ roll, "axis": axis / np.linalg.norm(axis),
+        })  # fmt: skip
+        xyz, rpy, direction = (" ".join(map(repr, x.tolist())) for x in (r, angles, axis))
+        texts.append(
+            f'<link name="link {k + 1}"/><joint name="joint-{k}" type="{kind}">'
+            f'<parent link="{parent}"/><child link="link {k + 1}"/><axis xyz="{direction}"/>'
+            f'<origin xyz="{xyz}" rpy="{rpy}"/><limit lower="-9" upper="9"/></joint>'
+        )
+    order = rng.permutation(len(texts))
+    return (
+        f'<robot name="t"><link name="link 0"/>{"".join(texts[k] for k in order)}</robot>',
+        joints,
+    )
+
+
+def forward(joints: list[dict[str, Any]], values: dict[str, float]) -> dict[str, Any]:
+    """Return the placement (4, 4) of each link, by matrices."""
+    found = {"link 0": np.eye(4)}
+    for joint in joints:
+        at, motion = np.eye(4), np.eye(4)
+        at[:3, :3], at[:3, 3] = joint["turn"], joint["r"]
+        value = values.get(joint["name"], 0.0)
+        if joint["kind"] == "prismatic":
+            motion[:3, 3] = value * joint["axis"]
+        else:
+            motion[:3, :3] = about(joint["axis"], value)
+        found[joint["child"]] = found[joint["parent"]] @ at @ motion
+    return found
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_that_random_trees_stand_where_their_matrices_say(tmp_path: Path, seed: int) -> None:
+    text, joints = random_tree(seed)
+    rng = np.random.default_rng(seed)
+    moving = [x["name"] for x in joints if x["kind"] != "fixed"]
+    values = dict(zip(moving, rng.uniform(-3, 3, len(moving)), strict=True))
+    m = model(tmp_path, text, pose=values)
+    drawn = drawn_frames(m)
+    for link, place in forward(joints, values).items():
+        np.testing.assert_allclose(drawn[link], place, rtol=0, atol=1e-12)
+    if seed % 5 or not moving:
+        return
+    others = {name: value + 0.2 for name, value in values.items()}
+    given = {name.replace("-", "_"): value for name, value in others.items()}
+    solution = kc.solve(kc.compile(m), [0.0], given)
+    for link, place in forward(joints, others).items():
+        origin, turn = spatial.frame(solution, link)
+        np.testing.assert_allclose(origin[0], place[:3, 3], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(turn[0].as_matrix(), place[:3, :3], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "name", [SMALL[0], *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE[:-1])]
+)
+def test_that_the_loops_are_closed_from_the_zero_pose(name: str) -> None:
+    """The frames of each pair of the sidecar coincide, though the file's own pose is open."""
+    frames = drawn_frames(kc.read(DATA / f"{name}.urdf"))
     text = (DATA / f"{name}.urdf").read_text()
     child = dict(re.findall(r'<joint name="([^"]+)".*?<child link="([^"]+)"', text, re.DOTALL))
     sidecar = yaml.safe_load((DATA / f"{name}.yaml").read_text())
