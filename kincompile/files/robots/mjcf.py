@@ -6,6 +6,7 @@ assets, plugins and macros are left out, and each element keeps its line.
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
@@ -21,7 +22,6 @@ from kincompile.files.robots.robot import (
     Joint,
     Mass,
     Robot,
-    Shape,
     from_quaternion,
     order_tree,
     placement,
@@ -96,6 +96,7 @@ class _MjcfReader(XmlReader):
         self._lines: dict[str, int] = {}
         self._heavy: set[str] = set()
         self._motors: list[str] = []
+        self._made: Counter[str] = Counter()
         self._meshes: list[str] = []
         self._equalities: list[Element] = []
 
@@ -134,6 +135,11 @@ class _MjcfReader(XmlReader):
                 found += other.children
         element.children[:] = found
 
+    def _new(self, name: str) -> str:
+        """Return a name that was not given before, for what has none."""
+        self._made[name] += 1
+        return name if self._made[name] == 1 else f"{name}_{self._made[name]}"
+
     def _check(self, element: Element) -> None:
         """Refuse macros and plugins, and note motors."""
         if element.tag in REFUSED:
@@ -154,12 +160,12 @@ class _MjcfReader(XmlReader):
             if child.tag == "geom" and "mesh" in child.attributes:
                 self._meshes.append(child.attributes["mesh"])
             if child.tag == "body":
-                child.attributes.setdefault("name", f"body_{child.line}")
-                name = child.attributes["name"]
+                name = child.attributes.setdefault("name", self._new(f"body_{child.line}"))
                 self._lines[name] = child.line
                 joints = [x for x in child.children if x.tag == "joint"]
                 for joint in joints:
-                    joint.attributes.setdefault("name", f"{name}_joint_{joint.line}")
+                    own = self._new(f"{name}_joint_{joint.line}")
+                    joint.attributes.setdefault("name", own)
                 if child.one("inertial"):
                     self._heavy.add(name)
             self._check(child)
@@ -202,7 +208,7 @@ class _MjcfReader(XmlReader):
             if kind := GEOMS.get(int(model.geom_type[k])):
                 at = from_quaternion(model.geom_pos[k], model.geom_quat[k])
                 body = self._bodies[model.geom_bodyid[k]]
-                robot.shapes.append(Shape.of(body, kind, model.geom_size[k].tolist(), at))
+                robot.add_shape(body, kind, model.geom_size[k].tolist(), at)
         robot.meshes = self._meshes
         order_tree(robot, self)
         for k in range(model.neq):

@@ -81,6 +81,8 @@ def assembled(
 ) -> Mechanism:
     """Return the mechanism of a robot whose loops are closed, as near to a pose as they can be."""
     tree = Tree(robot)
+    if not tree.size:
+        raise ModelError(f"{robot.file}: no joint of it moves; give one that turns or slides")
     _drop_couplings_of_fixed(robot)
     begin = _begin(tree, pose or {})
     x, outside = start_of(tree, begin, is_given=pose is not None)

@@ -36,8 +36,11 @@ CLOSURES = ("spherical", "revolute", "fixed", "universal", "prismatic")
 ROUND = np.pi / 6 * np.arange(12)
 """Angles of the corners of what is round."""
 
-MOST_JOINTS, MOST_LINKS = 300, 3000
-"""Joints that move, and links; the largest robots that were met have 78 and 150."""
+THIN = 1e-6
+"""Thickness from which a solid is one."""
+
+MOST_JOINTS, MOST_LINKS, MOST_SHAPES = 300, 3000, 500
+"""Joints that move, links, and shapes; the largest robots that were met have 78 and 150."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,6 +147,12 @@ class Shape:
         corners = points @ at[:3, :3].T + at[:3, 3]
         return cls(link, np.unique(np.round(corners, 9) + 0.0, axis=0))
 
+    @property
+    def is_solid(self) -> bool:
+        """Whether it has a volume that can be seen."""
+        away = self.corners - self.corners[0]
+        return int(np.linalg.matrix_rank(away, tol=THIN)) == 3
+
 
 @dataclass(slots=True, eq=False)
 class Robot:
@@ -161,12 +170,20 @@ class Robot:
     start: dict[str, tuple[float, ...]] = field(default_factory=dict)
     gravity: tuple[float, ...] = (0.0, 0.0, -9.81)
     shapes: list[Shape] = field(default_factory=list)
+    shapes_left: bool = False  # whether there are more
     meshes: list[str] = field(default_factory=list)  # names of files that are not read
 
     @property
     def parents(self) -> dict[str, Joint]:
         """The joint above each link."""
         return {joint.child: joint for joint in self.joints.values()}
+
+    def add_shape(self, link: str, kind: str, sizes: Sequence[float], at: Array) -> None:
+        """Add a shape of a link, where there is anything to see of it."""
+        if len(self.shapes) == MOST_SHAPES:
+            self.shapes_left = True
+        elif (made := Shape.of(link, kind, sizes, at)).is_solid:
+            self.shapes.append(made)
 
     def link_of(self, name: str) -> str | None:
         """Return the link whose frame is meant by the name of a link, or of a joint above it."""

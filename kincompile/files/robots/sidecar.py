@@ -81,7 +81,14 @@ def _document(path: Path, content: bytes) -> dict[str, Any]:
         raise ModelError(f"{shown_path}, line {line}: this is not YAML: {what}") from None
     if not isinstance(node, yaml.MappingNode):
         raise ModelError(f"{shown_path}, line 1: a sidecar has the keys {listed(KEYS)}")
-    return {str(key.value): (_words(value), key.start_mark.line + 1) for key, value in node.value}
+    found: dict[str, Any] = {}
+    for key, value in node.value:
+        line, name = key.start_mark.line + 1, str(key.value)
+        if name in found or not isinstance(key, yaml.ScalarNode):
+            what = f"{shown(name)} is there twice" if name in found else "a key is no text"
+            raise ModelError(f"{shown_path}, line {line}: {what}; keys are {listed(KEYS)}")
+        found[name] = _words(value), line
+    return found
 
 
 def _words(node: Any) -> Any:

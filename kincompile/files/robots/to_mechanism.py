@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 import logging
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ import sympy
 
 from kincompile.files.robots.robot import beside, legal_names
 from kincompile.model.equation import Equation
-from kincompile.names import COLUMNS, RESERVED, listed
+from kincompile.names import COLUMNS, RESERVED, listed, shown
 from kincompile.space.guesses import euler_parameters
 from kincompile.space.joints import (
     Fixed,
@@ -81,6 +82,7 @@ class _Builder:
         return {
             *RESERVED,
             *COLUMNS,
+            *keyword.kwlist,
             *(f"{x}_{name}" for name in self._names.values() for x in letters),
         }
 
@@ -133,7 +135,7 @@ class _Builder:
 
     def _show_names(self) -> None:
         pairs = {**self._joint_names, **self._names}
-        changed = [f"{old!r} is {new}" for old, new in pairs.items() if old != new]
+        changed = [f"{shown(old)} is {new}" for old, new in pairs.items() if old != new]
         if changed:
             LOG.warning(
                 "%s: names that may not stand in code are changed: %s", self._robot.file,
@@ -172,6 +174,9 @@ class _Builder:
             body, place = self._host[shape.link]
             corners = shape.corners @ place[:3, :3].T + place[:3, 3]
             found.setdefault(body, []).append([_tidy(x) for x in np.round(corners, 9)])
+        if self._robot.shapes_left:
+            count = len(self._robot.shapes)
+            LOG.warning("%s: shapes beyond the first %d are not drawn", self._robot.file, count)
         if self._robot.meshes:
             names = listed(list(dict.fromkeys(self._robot.meshes)), 5)
             LOG.info("%s: meshes are not read: %s", self._robot.file, names)

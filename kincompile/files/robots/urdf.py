@@ -18,7 +18,6 @@ from kincompile.files.robots.robot import (
     Joint,
     Mass,
     Robot,
-    Shape,
     from_rpy,
     order_tree,
 )
@@ -113,8 +112,8 @@ class _UrdfReader(XmlReader):
                 if item.tag != "box":
                     length = self.number(item, "length", 0.0)
                     sizes = [self.number(item, "radius", 0.0), length / 2]
-                if item.tag in ("box", "cylinder", "sphere") and sizes[0] > 0:
-                    self._robot.shapes.append(Shape.of(link, item.tag, sizes, at))
+                if item.tag in ("box", "cylinder", "sphere") and min(sizes) >= 0:
+                    self._robot.add_shape(link, item.tag, sizes, at)
 
     def _link(self, element: Element, *tags: str) -> str:
         """Return the link that a child with one of these tags names; "" with a problem."""
@@ -166,7 +165,11 @@ class _UrdfReader(XmlReader):
             return
         name, other = element.attributes["name"], mimic.attributes.get("joint", "")
         problem = _not_coupled(self._robot, name) or _not_coupled(self._robot, other)
-        if problem or name == other:
+        leads = {next(iter(x.left)): next(iter(x.right)) for x in self._robot.couplings}
+        ahead = other
+        while ahead in leads and ahead != name:
+            ahead = leads[ahead]
+        if problem or ahead == name:
             self.problem(mimic.line, problem or f"joint {name!r} mimics itself; name another one")
             return
         factors = self.number(mimic, "offset", 0.0), self.number(mimic, "multiplier", 1.0)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 MOST_ELEMENTS, MOST_LEVELS = 100_000, 200
 """Elements of a file, and elements within each other."""
+LONGEST_NAME = 200
+"""Characters of a name."""
 LARGEST = 1e9
 """Largest number: no robot has lengths, angles or masses beyond it."""
 
@@ -70,6 +72,8 @@ def read_xml(path: Path, content: bytes) -> Element:
             refuse(f"the file has more than {MOST_ELEMENTS:,} elements and attributes")
         if len(stack) > MOST_LEVELS:
             refuse(f"the file is nested too deeply, more than {MOST_LEVELS} levels")
+        if len(attributes.get("name", "")) > LONGEST_NAME:
+            refuse(f"a name has more than {LONGEST_NAME} characters; shorten it")
         element = Element(tag, attributes, parser.CurrentLineNumber)
         stack[-1].children.append(element)
         stack.append(element)

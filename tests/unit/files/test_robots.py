@@ -23,6 +23,7 @@ from kincompile.files.robots.xml_text import read_xml
 from kincompile.model.mechanism import changed
 from kincompile.view.drawing import drawing
 from kincompile.view.marks import GROUND_FRAME, Hull, shape_of
+from tests.unit.files.robot_files import GOOD, MJCF, TREE, model
 
 DATA = Path(__file__).parents[2] / "data" / "robots"
 SMALL, LARGE = ["5bar_linkage_iso3d", "welded_four_bar"], [
@@ -204,24 +205,6 @@ def test_that_loops_in_the_file_are_those_of_the_sidecar(
     assert len(by_loop.system().equations) == len(by_sidecar.system().equations)
 
 
-LINKS = '<link name="base"/><link name="a"/><link name="b"/>'
-HINGES = (
-    '<joint name="first" type="revolute"><parent link="base"/><child link="a"/>'
-    '<axis xyz="0 0 2"/><limit lower="-1" upper="1"/></joint>\n'
-    '<joint name="second" type="{}"><parent link="base"/><child link="b"/>'
-    '<origin xyz="1 0 0" rpy="0 0 0.5"/><axis xyz="0 0 1"/>{}</joint>\n'
-)
-TREE = f"<robot name='r'>{LINKS}\n{HINGES}</robot>"
-
-
-def model(tmp_path: Path, text: str, sidecar: str = "", **given: Any) -> Any:
-    path = tmp_path / "robot.urdf"
-    path.write_text(text)
-    if sidecar:
-        path.with_suffix(".yaml").write_text(sidecar)
-    return kc.read(path, **given)
-
-
 BELT = (
     '<coupling name="belt"><predecessor link="a"/><successor link="b"/><ratio value="0.5"/>'
     "</coupling></robot>"
@@ -362,74 +345,6 @@ def test_masses_of_links_that_a_fixed_joint_joins(tmp_path: Path) -> None:
     assert np.diag(body.inertia) == pytest.approx([2e-3, 0.504, 0.504])
 
 
-GOOD = TREE.format("continuous", "")
-TWICE = GOOD.replace('name="second"', 'name="first"')
-REFUSED = {
-    "bomb": ('<!DOCTYPE r [<!ENTITY a "b">]>' + GOOD, r"line 1: a document type"),
-    "external": ('<!DOCTYPE r SYSTEM "file:///etc/passwd"><r/>', r"line 1: a document type"),
-    "not XML": (GOOD.replace("</robot>", ""), r"line 4: this is not XML"),
-    "other root": ("<sdf/>", r"line 1: this is no URDF: it begins with <sdf>"),
-    "zero axis": (GOOD.replace("0 0 2", "0 0 0"), r"line 2: the axis is zero; give a direction"),
-    "NaN": (GOOD.replace("1 0 0", "nan 0 0"), r"line 3: xyz of <origin> .* is not a number"),
-    "huge": (GOOD.replace("1 0 0", "1e300 0 0"), r"line 3: xyz .* not a number of at most 1e\+09"),
-    "two numbers": (GOOD.replace("0 0 2", "0 2"), r"line 2: xyz of <axis> is '0 2': give 3 num"),
-    "two parents": (GOOD.replace('child link="b"', 'child link="a"'),
-                    r"line 3: link 'a' has two parents, by the joints 'first' and 'second'"),
-    "cycle": (GOOD.replace('parent link="base"', 'parent link="b"', 1).replace(
-        '<parent link="base"/><child link="b"/>', '<parent link="a"/><child link="b"/>'),
-        r"line \d: joint 'first' is part of a cycle"),
-    "no parent": (GOOD.replace('<link name="a"/>', '<link name="a"/><link name="c"/>'),
-                  r"the links 'base', 'c' have no parent"),
-    "missing link": (GOOD.replace('child link="a"', 'child link="bass"'),
-                     r"line 2: <joint> names the link 'bass', which is nowhere; .* 'base'"),
-    "twice": (TWICE, r"line 3: there are two joints 'first'; rename one"),
-    "floating": (TREE.format("floating", ""), r"line 3: joint 'second' has the type 'floating'"),
-    "limits": (GOOD.replace('lower="-1"', 'lower="2"'), r"line 2: .* its lower limit 2 is above"),
-    "mimic": (TREE.format("continuous", '<mimic joint="fist"/>'),
-              r"line 3: joint 'fist' is nowhere; did you mean 'first'"),
-    "loop": (GOOD.replace("</robot>", '<loop type="sphere"/></robot>'),
-             r"line 4: <loop> has the type 'sphere': .*did you mean 'spherical'"),
-    "xacro": (GOOD.replace("<link", "<xacro:macro/><link", 1),
-              r"line 1: this is a xacro file; expand it"),
-    "open": (GOOD.replace("</robot>", '<loop type="spherical"><predecessor link="a">'
-             '<origin xyz="9 0 0"/></predecessor><successor link="b"/></loop></robot>'),
-             r"its loops cannot be closed; from where it begins they miss by 8 \[m or rad\]"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_that_a_fault_is_named_with_its_line(tmp_path: Path, case: str) -> None:
-    text, message = REFUSED[case]
-    with pytest.raises(kc.ModelError, match=message) as caught:
-        model(tmp_path, text)
-    assert all("robot.urdf" in problem for problem in caught.value.problems)
-
-
-SIDECARS = {
-    "bomb": ("a: &a [x]\nb: [*a, *a]\n", r"line 2: aliases \(\*\) are not read"),
-    "code": ("closed_loop: !!python/object/apply:os.system [[a, b]]\ntype: [7d]\n",
-             r"line 2: type '7d' is no type of a loop: write 6d or 3d"),
-    "deep": ("closed_loop: " + "[" * 1000, r"line 1: the lists are nested too deeply"),
-    "types": ("closed_loop: [[a, b]]\ntype: [6d, 3d]\n", r"line 2: type has 2 entries for 1 pairs"),
-    "frame": ("closed_loop:\n- [a, secont]\ntype: [6d]\n",
-              r"line 2: frame 'secont' is nowhere in .*robot.urdf; did you mean 'second'"),
-    "motor": ("name_mot:\n- first\n- secnd\n", r"line 3: joint 'secnd' is nowhere .* 'second'"),
-    "itself": ("closed_loop: [[b, second]]\ntype: [6d]\n", r"line 1: .* joins 'b' to itself"),
-    "kind": ("joint_name: [first]\njoint_type: [UJOINT_XX]\n", r"line 2: joint 'first' has"),
-    "kinds": ("joint_name: [first]\n", r"line 1: joint_name has 1 names, joint_type 0 types"),
-    "text": ("closed_loop: a\n", r"line 1: closed_loop is no list"),
-    "not YAML": ("a: [", r"line 1: this is not YAML"),
-    "no table": ("- a\n", r"line 1: a sidecar has the keys closed_loop"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", SIDECARS)
-def test_that_a_fault_of_a_sidecar_is_named_with_its_line(tmp_path: Path, case: str) -> None:
-    sidecar, message = SIDECARS[case]
-    with pytest.raises(kc.ModelError, match=f"robot.yaml, {message}"):
-        model(tmp_path, GOOD, sidecar)
-
-
 def test_what_is_said_of_motors(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     mimic = TREE.format("continuous", '<mimic joint="first"/>')
     m = model(tmp_path, mimic, "name_mot: [second, first]\nclosed_loop: []\n")
@@ -458,35 +373,6 @@ def test_that_a_robot_becomes_a_model_file(tmp_path: Path) -> None:
     assert [solution[f"tool_tip.{x}"][0] for x in "xyz"] == pytest.approx(place, abs=1e-12)
     with pytest.raises(kc.InputError, match="r has no link 'tool-tip'; links are those of a file"):
         spatial.frame(solution, "tool-tip")
-
-
-MJCF = (
-    '<mujoco><include file="{}"/><worldbody><body><inertial pos="0 0 0" mass="2" '
-    'diaginertia="1 1 1"/><joint name="j" axis="{}"/>{}</body></worldbody></mujoco>'
-)
-
-
-def test_mjcf_that_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "robot.xml"
-    (tmp_path / "part.xml").write_text('<m><include file="other.xml"/></m>')
-    (tmp_path / "other.xml").write_text('<m><include file="part.xml"/></m>')
-    (tmp_path / "good.xml").write_text('<m><compiler angle="radian"/></m>')
-    bomb = '<replicate count="1000000000"><site/></replicate>'
-    for given, message in (
-        (("../secret.xml", "0 0 1", ""), r"line 1: the include '../secret.xml' is outside"),
-        (("part.xml", "0 0 1", ""), r"line 1: the include 'part.xml' includes itself"),
-        (("good.xml", "0 0 1", bomb), r"line 1: <replicate> is not read"),
-        (("good.xml", "0 0 NaN", ""), r"line 1: axis of <joint> has 'NaN': give numbers up to"),
-        (("good.xml", "0 0 1e99", ""), r"line 1: axis of <joint> has '1e99': give numbers up to"),
-        (("good.xml", "0 0", ""), r"robot.xml, line 1: MuJoCo refuses this file: .*axis.*line 1"),
-    ):
-        path.write_text(MJCF.format(*given))
-        with pytest.raises(kc.ModelError, match=message):
-            kc.read(path)
-    path.write_text(MJCF.format("good.xml", "0 0 1", ""))
-    assert kc.read(path).bodies[0].mass == 2
-    with pytest.raises(kc.InputError, match="loops are in <equality>"):
-        kc.read(path, loops="a.yaml")
 
 
 def test_that_mjcf_counts_values_from_its_references(tmp_path: Path) -> None:
