@@ -15,6 +15,7 @@ from kincompile.runtime.engine.scales import Point
 from kincompile.runtime.engine.sparse import Sparse
 from kincompile.runtime.grid import solve_grid
 from kincompile.runtime.march import CORRECTIONS_ON_GRID, March, Outcome, State
+from kincompile.runtime.memory import empty
 from kincompile.runtime.singular.events import ended, singular_start
 from kincompile.runtime.singular.sides import doubt
 from kincompile.runtime.start import give_up, start
@@ -67,9 +68,9 @@ class Motion:
         """Make the arrays for a time grid, or for several motions over it, with nothing reached."""
         n, shape = inputs.guess.size, (inputs.t.size, *count)
         if count or inputs.code.blocks:
-            states = np.empty((3, shape[0], n, *count)).swapaxes(1, 2)
+            states = empty((3, shape[0], n, *count)).swapaxes(1, 2)
         else:  # each coordinate contiguous in memory, as the code of a grid wants it
-            states = np.empty((3, n, *shape))
+            states = empty((3, n, *shape))
         status = np.full(shape, int(Status.NOT_REACHED))
         return cls(states, status, np.full(shape, np.nan), np.zeros(shape, dtype=np.int64))
 

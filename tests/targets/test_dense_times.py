@@ -6,6 +6,7 @@ import sympy
 
 import kincompile as kc
 from kincompile.emitters.c.target import LANES
+from kincompile.runtime.memory import SMALLEST, free
 from kincompile.runtime.status import Status
 
 pytestmark = pytest.mark.usefixtures("quick_compiler")
@@ -79,3 +80,13 @@ def test_that_no_curve_leads_over_a_singular_configuration(law):
     found, known = kc.solve(native, t), kc.solve(module, t)
     assert found.events[0].t == pytest.approx(0.5, abs=2e-3)
     require_same(found, known)
+
+
+def test_that_the_memory_of_a_large_solution_is_kept_for_the_next(example_named):
+    native, t = example_named("four_bar").native, np.linspace(0, 1, SMALLEST // (9 * 3 * 8) + 1)
+    first = kc.solve(native, t)
+    known, place = first.q[-1].copy(), first.q.ctypes.data
+    assert place not in [x.ctypes.data for x in free]
+    del first
+    assert place in [x.ctypes.data for x in free]
+    np.testing.assert_array_equal(kc.solve(native, t).q[-1], known)
