@@ -433,7 +433,7 @@ _always_inline void copy(double *to, const double *from, size_t size, int is_far
     memcpy(to, from, size * sizeof *to);
 }
 
-// Fetch the place of the next strip, while that is computed.
+// Fetch the place of the strip that comes next, while that is computed.
 _always_inline void fetch(const double *to)
 {
 #ifdef __GNUC__
@@ -443,9 +443,9 @@ _always_inline void fetch(const double *to)
     (void)to;
 }
 
-// Copy rows to where they are wanted: all of them, or those listed.
+// Copy rows to where they are wanted: all of them, or those listed. The next ones go so far ahead.
 static inline void store_rows(problem_3_5_6_output to, double (*restrict rows)[LANES], const int *listed,
-    int size, size_t start, size_t count, int is_far)
+    int size, size_t start, size_t count, ptrdiff_t ahead, int is_far)
 {
     if (to.first == NULL)
         return;
@@ -454,7 +454,7 @@ static inline void store_rows(problem_3_5_6_output to, double (*restrict rows)[L
         const int i = listed ? listed[n] : n;
         copy(first + i * to.entry, rows[i], LANES, is_far);
         if (!is_far)
-            fetch(first + i * to.entry + LANES);
+            fetch(first + i * to.entry + ahead);
     }
     for (size_t k = 0; !(to.point == 1 && count == LANES) && k < count; k++)
         for (int n = 0; n < size; n++) {
@@ -589,7 +589,7 @@ _always_inline void write_quantity(const problem_3_5_6_batch *batch, const quant
     if (is_matrix && whole.first)
         write_matrices(whole, q, rows_of(b, q), matrices + q->place, only, start, count, is_far);
     store_rows(is_matrix ? output_of(batch, q->nonzeros) : whole, rows_of(b, q),
-        only ? q->computed_entry : NULL, only ? q->computed : q->entries, start, count, is_far);
+        only ? q->computed_entry : NULL, only ? q->computed : q->entries, start, count, LANES, is_far);
 }
 
 // What works on one motion, and on given points.
@@ -658,7 +658,7 @@ void problem_3_5_6_solve(const problem_3_5_6_system *system)
         read_rows(right, M, system->b, start, count, check);
         factor_of_strip(&b, count);
         solve_of_strip(b.Phi_q, b.F, right, x, count);
-        store_rows(system->x, x, NULL, N, start, count, 0);
+        store_rows(system->x, x, NULL, N, start, count, LANES, 0);
     }
 }
 
@@ -917,12 +917,12 @@ static void missed_of_strip(const strip *b, const double (*weight)[LANES],
     }
 }
 
-// Write rows where those of a time are wanted, which begin so much farther on.
-static void store(problem_3_5_6_output to, ptrdiff_t time, double (*rows)[LANES], size_t first,
-    size_t count)
+// Write rows where those of a time are wanted. Of variants, each time begins a step farther on.
+static void store(problem_3_5_6_output to, ptrdiff_t time, ptrdiff_t step, double (*rows)[LANES],
+    size_t first, size_t count)
 {
-    to.first += time;
-    store_rows(to, rows, NULL, N, first, count, 0);
+    to.first += time * step;
+    store_rows(to, rows, NULL, N, first, count, step ? step : LANES, 0);
 }
 
 // Whether a truth holds in any lane.
@@ -1273,9 +1273,9 @@ static void advance(strip *b, const scales *s, state *at, double t, size_t k, ou
 static void record(const problem_3_5_6_variants *m, strip *b, const outcome *o, size_t time,
     size_t first, size_t count)
 {
-    store(m->q, (ptrdiff_t)time * m->time, b->q, first, count);
-    store(m->q_dot, (ptrdiff_t)time * m->time, b->q_dot, first, count);
-    store(m->q_ddot, (ptrdiff_t)time * m->time, b->q_ddot, first, count);
+    store(m->q, (ptrdiff_t)time, m->time, b->q, first, count);
+    store(m->q_dot, (ptrdiff_t)time, m->time, b->q_dot, first, count);
+    store(m->q_ddot, (ptrdiff_t)time, m->time, b->q_ddot, first, count);
     for (size_t k = 0; k < count; k++) {
         const size_t place = time * m->variants + first + k;
         m->residual[place] = o->is_over[k] ? NAN : o->residual[k];
@@ -1820,7 +1820,7 @@ void problem_3_5_6_attempt_variants(const problem_3_5_6_variants *m)
         const size_t count = m->variants - first < LANES ? m->variants - first : LANES;
         put_at_guesses(m, &b, &s, first, count, &o);
         descend(&b, &s, scale, m->max_iterations, &d, count);
-        store(m->q, (ptrdiff_t)0 * m->time, b.q, first, count);
+        store(m->q, (ptrdiff_t)0, m->time, b.q, first, count);
         for (size_t k = 0; k < count; k++)
             m->status[first + k] = d.is_near[k] ? PROBLEM_3_5_6_CONVERGED
                 : PROBLEM_3_5_6_NOT_CONVERGED;
@@ -1900,7 +1900,7 @@ void problem_3_5_6_mirror_variants(const problem_3_5_6_variants *m, const double
         const size_t count = m->variants - first < LANES ? m->variants - first : LANES;
         put_at_guesses(m, &b, &s, first, count, &o);
         mirror(&b, magnitude, scale, &d, count);
-        store(m->q, (ptrdiff_t)0 * m->time, b.q, first, count);
+        store(m->q, (ptrdiff_t)0, m->time, b.q, first, count);
     }
 }
 

@@ -91,6 +91,11 @@ class Motion:
         states, status, residual, iterations = (values[..., which] for values in self.arrays)
         return Motion(states, status, residual, iterations)
 
+    def during(self, times: slice) -> Motion:
+        """Return all motions at some of the times, in the same arrays."""
+        said = self.status[times], self.residual[times], self.iterations[times]
+        return Motion(self.states[:, :, times], *said)
+
     def fill(self, which: Any, motion: Motion) -> None:
         """Fill in one of the motions, or some, that were followed by themselves."""
         for values, own in zip(self.arrays, motion.arrays, strict=True):

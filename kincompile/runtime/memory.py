@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,19 +18,19 @@ if TYPE_CHECKING:
 
     Bytes = NDArray[np.uint8]
 
-SMALLEST, LARGEST = 10_000_000, 1 << 26
+SMALLEST, LARGEST = 10_000_000, 1 << 27
 """Bytes of an array whose memory is kept: smaller ones gain nothing. Without, Phi_q of 100,000
 points of a four-bar, nearly 64 MiB, takes 1.4 times as long in NumPy, and 2.4 times in C."""
 
-KEPT = 4
-"""Pieces of memory that are kept at most: the matrices of four calls."""
+KEPT = 1 << 28
+"""Bytes that are kept at most: the matrices of four calls, or the motions of three chunks."""
 
 # glibc raises its threshold for mmap to the size of the largest freed block. Freeing one of 32 MB,
 # its limit, at import keeps later results on the heap; no page of it is touched. Without this
 # `kinematics` of 100,000 points takes 1.2 times as long in NumPy, and 1.3 times in C.
 np.empty(4_000_000)
 
-free: deque[Bytes] = deque(maxlen=KEPT)
+free: deque[Bytes] = deque()
 
 
 class _Loan:
@@ -39,7 +40,7 @@ class _Loan:
     """
 
     def __init__(self, memory: Bytes, shape: tuple[int, ...], kind: np.dtype[Any]) -> None:
-        self._memory, self._free = memory, free  # there to the interpreter's end
+        self._memory, self._free, self._keep = memory, free, _keep  # to the interpreter's end
         self.__array_interface__ = {
             "version": 3,
             "data": (memory.ctypes.data, False),
@@ -48,7 +49,15 @@ class _Loan:
         }
 
     def __del__(self) -> None:
-        self._free.append(self._memory)
+        self._keep(self._free, self._memory)
+
+
+def _keep(free: deque[Bytes], memory: Bytes) -> None:
+    """Keep memory for a later call; of too much the oldest goes."""
+    free.append(memory)
+    with suppress(IndexError):  # another thread was quicker
+        while sum(piece.size for piece in tuple(free)) > KEPT:
+            free.popleft()
 
 
 def empty(shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:

@@ -68,11 +68,14 @@ def solve_variants(inputs: Inputs, sets: Array, progress: Progress | None) -> So
     """
     count, motions = len(sets), _over(inputs, len(sets))
     inputs, begin = first_position(inputs)
+    is_whole = True
     for first in range(0, count, CHUNK):
         chunk = slice(first, min(first + CHUNK, count))
-        _Chunk(inputs, begin, sets[chunk], motions.of(chunk)).solve()
+        is_whole &= _Chunk(inputs, begin, sets[chunk], motions.of(chunk)).solve()
         if progress:
             progress(chunk.stop, count)
+    if is_whole:
+        motions.statistics["compiled"] = inputs.t.size
     if inputs.smooth:
         _warn_of(inputs, _go_through(inputs, sets, motions))
     return _solution(inputs, motions, begin.doubt)
@@ -131,48 +134,65 @@ class _Chunk:
         self._sets, self._motions = Sets(inputs, begin, sets), motions
         self._times: list[float] = inputs.t.tolist()
 
-    def solve(self) -> None:
-        """Solve: compiled, where the module can, and with care what fails."""
+    def solve(self) -> bool:
+        """Solve: compiled, where the module can, and with care what fails.
+
+        Says whether compiled code has reached, and checked, all that is there.
+        """
         everyone = np.arange(len(self._p))
         if self._inputs.code.march is None:
             self._finish(self._assembled(everyone))
-            return
-        status, q = self._marched(everyone, self._begin.q)
-        elsewhere = (status[0] != Status.CONVERGED) | self._sets.left_branch(everyone, q)
-        self._go_on(everyone[~elsewhere])
+            return False
+        self._march_compiled(self._begin.q, slice(1))
+        motions = self._motions
+        q, status = motions.states[0, :, 0].copy(), motions.status[0].copy()
+        elsewhere = (status != Status.CONVERGED) | self._sets.left_branch(everyone, q)
         if elsewhere.any():
-            self._solve_from_own_places(everyone[elsewhere], status[0, elsewhere].copy())
+            self._solve_from_own_places(everyone, elsewhere, q, status)
+            return False
+        if self._inputs.t.size > 1:
+            self._march_on(q)
+        is_whole = not motions.status.any()
+        self._go_on(everyone)
+        return is_whole
 
-    def _solve_from_own_places(self, variants: Places, status: Statuses) -> None:
-        """Solve compiled what is not on the branch from the first position, but from its own.
+    def _solve_from_own_places(
+        self, everyone: Places, elsewhere: Mask, q: Array, status: Statuses
+    ) -> None:
+        """Solve all, of which some are not on the branch from the first position, from their own.
 
-        What became of it there is taken back.
+        Those that have none are at rest in the march: where a guess is no number, nothing moves.
         """
-        self._motions.forget(0, variants)
-        self._motions.forget(slice(None), variants[status == Status.CONVERGED])
-        lanes = self._assembled(variants, status)
-        if not lanes.motions.size:
-            return
-        found, _ = self._marched(lanes.motions, lanes.state.point.q)
-        good = found[0] == Status.CONVERGED
-        self._go_on(lanes.motions[good])
-        if not good.all():
-            lanes = lanes.some(~good)
+        motions, lost = self._motions, everyone[elsewhere]
+        motions.forget(0, lost)
+        lanes = self._assembled(lost, status[lost])
+        q[:, lost] = np.nan
+        q[:, lanes.motions] = lanes.state.point.q
+        left = np.setdiff1d(lost, lanes.motions)
+        kept = [values[..., 0, left] for values in motions.arrays]
+        self._march_on(q)
+        for values, own in zip(motions.arrays, kept, strict=True):
+            values[..., 0, left] = own
+        good = motions.status[0] == Status.CONVERGED
+        good[left] = False
+        self._go_on(everyone[good])
+        lanes = lanes.some(~good[lanes.motions])
+        if lanes.motions.size:
             first = Lanes(lanes.motions, lanes.index - 1, lanes.state)
             self._record(first, lanes.state, np.ones(lanes.motions.size, bool), 0 * lanes.index)
             self._finish(lanes)
 
-    def _marched(self, variants: Places, guess: Array) -> tuple[Statuses, Array]:
-        """Let the compiled march follow variants from a guess, or from one of each (n, V).
+    def _march_on(self, q: Array) -> None:
+        """Let the compiled march follow all from positions (n, V) at the first time."""
+        iterations = self._motions.iterations[0].copy()
+        self._march_compiled(q, slice(None))
+        self._motions.iterations[0] = iterations
 
-        Returns what became of them, `Status` (N, V), and their first positions (n, V).
-        """
-        is_all = variants.size == len(self._p)
-        motions = self._motions if is_all else Motion.over(self._inputs, variants.size)
-        motions.march_compiled(self._inputs, self._sets.march(variants), guess, self._p[variants])
-        if not is_all:
-            self._motions.fill(variants, motions)
-        return motions.status, motions.states[0, :, 0]
+    def _march_compiled(self, guess: Array, times: slice) -> None:
+        """Let the compiled march follow all at some times, from one guess or those of each."""
+        inputs = replace(self._inputs, t=self._inputs.t[times])
+        part = self._motions.during(times)
+        part.march_compiled(inputs, self._sets.march(), guess, self._p)
 
     def _go_on(self, variants: Places) -> None:
         """Take those variants on that the compiled march has left on their way."""

@@ -369,7 +369,7 @@ class CSolver(SolverPrinter):
                 return f"{texts[0]} {sign} {texts[1]} ? {texts[0]} : {texts[1]}", CHOICE
             case "store", (Field(owner) as block, rows, time, *rest):
                 stride = f"{owner.variable.name}{self.arrow(owner)}time"
-                parts = [f"(ptrdiff_t){self.at(time, ATOM)} * {stride}", self.place(rows)]
+                parts = [f"(ptrdiff_t){self.at(time, ATOM)}", stride, self.place(rows)]
                 parts += map(self.expression, rest)
                 return f"store({self.place(block)}, {', '.join(parts)})", ATOM
         is_kernel = node.name in (*KERNELS, "missed")

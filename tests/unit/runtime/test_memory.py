@@ -1,6 +1,7 @@
 """Memory of large results is used again when nobody holds them, and never before."""
 
 import gc
+import math
 import threading
 import weakref
 
@@ -16,7 +17,7 @@ SHAPE = (3000, 1000)
 @pytest.fixture(autouse=True)
 def no_memory(monkeypatch):
     """Begin without memory of earlier results."""
-    monkeypatch.setattr(memory, "free", type(memory.free)(maxlen=memory.KEPT))
+    monkeypatch.setattr(memory, "free", type(memory.free)())
 
 
 def address(array):
@@ -77,13 +78,14 @@ def test_small_and_very_large_arrays_are_left_to_numpy():
 
 
 def test_only_so_much_memory_is_kept_and_none_is_used_for_far_less():
-    arrays = [memory.empty(SHAPE) for _ in range(memory.KEPT + 3)]
+    most = memory.KEPT // (8 * math.prod(SHAPE))
+    arrays = [memory.empty(SHAPE) for _ in range(most + 3)]
     arrays.clear()
-    assert len(memory.free) == memory.KEPT
+    assert len(memory.free) == most
     small = memory.empty((1400, 1000))
-    assert len(memory.free) == memory.KEPT
+    assert len(memory.free) == most
     nearly = memory.empty((1600, 1000))
-    assert len(memory.free) == memory.KEPT - 1
+    assert len(memory.free) == most - 1
     assert small.size < nearly.size
 
 
@@ -104,7 +106,7 @@ def test_threads_never_share_memory():
     for thread in threads:
         thread.join()
     assert not clashes
-    assert len(memory.free) <= memory.KEPT
+    assert sum(piece.size for piece in memory.free) <= memory.KEPT
 
 
 @pytest.fixture(params=["numpy", "c"])

@@ -409,3 +409,26 @@ def test_that_nothing_is_said_of_points_that_are_not_reached(example_named, quic
     for values in (found.q, found.q_dot, found.q_ddot, found.residual):
         assert np.isnan(values[beyond]).all()
     assert not found.iterations[beyond].any()
+
+
+def test_that_compiled_sets_that_end_at_once_or_on_the_way_leave_the_others_alone(
+    example_named, quick_compiler
+):
+    example = example_named("four_bar")
+    native, t = example.native, np.linspace(0, 4, 40)
+    p = np.tile(native.DEFAULTS, (70, 1))
+    p[:, native.PARAMETERS.index("a")] *= np.linspace(0.95, 1.05, 70)
+    p[1::3, native.PARAMETERS.index("a")] = 100.0  # cannot be assembled
+    p[2::3, native.PARAMETERS.index("d")] *= 2.5  # locks up
+    together = kc.solve(native, t, p[:, np.newaxis])
+    ends = [Status.CONVERGED, Status.NOT_ASSEMBLED, Status.LOCK_UP]
+    for k in range(9):
+        alone = kc.solve(example.module, t, p[k])
+        assert ends[k % 3] in together.status[k]
+        np.testing.assert_array_equal(together.status[k], alone.status)
+        reached = alone.status == Status.CONVERGED
+        assert reached.any() == (k % 3 != 1)
+        for name in ("q", "q_dot", "q_ddot"):
+            found, wanted = getattr(together, name)[k], getattr(alone, name)
+            np.testing.assert_allclose(found[reached], wanted[reached], rtol=1e-8, atol=1e-8)
+            assert np.isnan(found[~reached]).all()
