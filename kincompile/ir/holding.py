@@ -16,7 +16,7 @@ import numpy as np
 from kincompile.ir.held_rows import SPACE, holding, product, spins_of
 from kincompile.ir.interpret import interpreter
 from kincompile.ir.lower import lower
-from kincompile.ir.redundancy import evaluation, rank_report
+from kincompile.ir.redundancy import rank_report
 from kincompile.model.points import BodyPoint
 from kincompile.structure.idle import RIGID, Loose, Web, spread
 from kincompile.structure.rank import DEPENDENT
@@ -58,7 +58,8 @@ def _is_clear(system: ConstraintSystem, loose: Collection[str]) -> bool:
     guess = np.array([[item.guess for item in system.coordinates]])
     columns = _columns(system, loose)
     with np.errstate(all="ignore"):
-        matrix = evaluation(lower(system.about(loose)))(guess, np.zeros(1))[1][0][:, columns]
+        (found,) = interpreter(lower(system.about(loose)), ("Phi_q",))(guess, guess, 0.0)
+        matrix = found[0][:, columns]
     own = matrix[np.abs(matrix).max(axis=1) > 0]
     if len(own) < len(columns) or not np.isfinite(own).all() or not own.any(axis=0).all():
         return False

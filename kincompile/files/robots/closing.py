@@ -10,7 +10,9 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from kincompile.files.robots.robot import placement, skew, turned
 
@@ -96,9 +98,9 @@ class Tree:
                 slopes.append(np.atleast_2d(slope.T))
         for coupling in self.robot.couplings:
             left, right = (self._sum(part) for part in (coupling.left, coupling.right))
-            value, factor = _polynomial(coupling.polynomial, float(right @ x))
-            rows.append(np.atleast_1d(left @ x - value))
-            slopes.append(np.atleast_2d(left - factor * right))
+            value, along = Polynomial(coupling.polynomial), right @ x
+            rows.append(np.atleast_1d(left @ x - value(along)))
+            slopes.append(np.atleast_2d(left - value.deriv()(along) * right))
         return np.concatenate(rows), np.concatenate(slopes)
 
     def _sum(self, factors: Mapping[str, float]) -> Array:
@@ -237,19 +239,6 @@ def _inverse(frame: Array) -> Array:
     return placement(-turn @ frame[:3, 3], turn)
 
 
-def rotation_vector(turn: Array) -> Array:
-    """Return the rotation vector of a matrix (3, 3)."""
-    twice = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    s, c = np.linalg.norm(twice) / 2, (np.trace(turn) - 1) / 2
-    angle = np.arctan2(s, c)
-    if s > 1e-6:
-        return np.asarray(twice * angle / (2 * s))
-    if c > 0:
-        return np.asarray(twice / 2)
-    column = (turn + np.eye(3))[:, int(np.argmax(np.diag(turn)))]
-    return np.asarray(angle * column / np.linalg.norm(column))
-
-
 def _spin_of(rotation: Array) -> Array:
     """Return J (3, 3): the angular velocity, before the turn, is J times the vector's rate."""
     angle = float(np.linalg.norm(rotation))
@@ -300,13 +289,5 @@ def _closure_rows(closure: Closure, a: Side, b: Side) -> Iterator[tuple[Array, A
         yield np.array([u @ v]), (u_rate @ v + v_rate @ u)[:, None]
     elif closure.kind in ("fixed", "prismatic"):
         turn = frame_b[:3, :3] @ frame_a[:3, :3].T
-        rotation = rotation_vector(turn)
+        rotation = Rotation.from_matrix(turn).as_rotvec()
         yield rotation, (spin_b - spin_a @ turn.T) @ np.linalg.inv(_spin_of(rotation)).T
-
-
-def _polynomial(factors: Sequence[float], x: float) -> tuple[float, float]:
-    """Return a polynomial and its derivative."""
-    value = slope = 0.0
-    for factor in reversed(factors):
-        value, slope = value * x + factor, slope * x + value
-    return value, slope
