@@ -42,6 +42,9 @@ ORDERS = ("", "_dot", "_ddot")
 SMALLEST_STEP = 1e-6
 """Time between two points whose times are found, as a part of all time."""
 
+LATE = 1e-3
+"""Part of all time by which the last of these points may be late, and the steps be shortened."""
+
 GRID = 73
 """Times at which the motion as a whole is looked at, and between which extremes are found."""
 
@@ -97,6 +100,18 @@ class Demands:
             count = len(target.values)
             found.append(np.cumsum(variables[first : first + count]))
             first += count
+        return found
+
+    def within(self, variables: Array) -> Array:
+        """Return variables that are times, with steps shortened where the last time is late."""
+        found, first = variables.copy(), 0
+        for (begin, end), (target, _) in zip(self.free, self.untimed, strict=True):
+            own = slice(first, first + len(target.values))
+            first = own.stop
+            late = float(found[own].sum()) - end
+            if 0 < late <= LATE * (end - begin):
+                found[own] *= (end - begin) / (end - begin + late)
+                found[own.start] += begin * late / (end - begin + late)
         return found
 
 

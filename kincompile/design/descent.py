@@ -42,14 +42,8 @@ if TYPE_CHECKING:
 CORRECTIONS = 6
 """Of Newton's method, for a trial; one that takes more is too far from the trial before."""
 
-FIRST, AGAIN, ROUNDS = 120, 150, 2
-"""Steps of a start, at most; steps around the best ends, and how many times they are taken."""
-
-ITERATIONS = FIRST + ROUNDS * AGAIN
-"""Steps of a search."""
-
-BEST, NEAR = 4, (1e-3, 1e-1)
-"""Ends around which there are further starts, and how far, in parts of the bounds."""
+ITERATIONS = 120
+"""Steps of a start, at most."""
 
 KEPT = {8: 4.0, 20: 2.0, 40: 1.0, 80: 0.25}
 """After how many steps the best are kept, in parts of the starts that are followed. Others are left
@@ -120,13 +114,13 @@ class Descent:
 
     def solved(self, x: Array, q: Array, signs: Array | None = None) -> Batch:
         """Solve motions (B, nx) from positions nearby (B, N, n), on the branch of signs."""
-        code, t, sets = code_of(self.bench.module), self._times(x), self.bench.sets(x)
+        code, t, sets = code_of(self.bench.module), self.times(x), self.bench.sets(x)
         count, steps, n = q.shape
         flat = np.ascontiguousarray(q.reshape(-1, n).T)
         self.motions += count
         with np.errstate(all="ignore"):
             equations = problem(code, sets[0], q[0, 0], float(t[0, 0]))
-            march = March(equations, Planned(code, _lanes(sets, steps)), TOLERANCE)
+            march = March(equations, Planned(code, lanes_of(sets, steps)), TOLERANCE)
             found = march.correct_together(flat, t.ravel(), CORRECTIONS)
             state, checks = march.complete(found.point)
         good = np.reshape(all_hold(found.good, checks), (count, steps))
@@ -140,7 +134,7 @@ class Descent:
             batch.cost[batch.good] = self.seen(batch.some(batch.good)).costs()
         return batch
 
-    def _times(self, x: Array) -> Array:
+    def times(self, x: Array) -> Array:
         """Return the times of motions, (B, N): those of the grid, then of each passing target."""
         demands = self.bench.demands
         own = [demands.instants(row) for row in x[:, len(self.bench.names) :]]
@@ -154,7 +148,7 @@ class Descent:
         if names:
             count, steps, n = batch.q.shape
             states = (np.ascontiguousarray(part.reshape(-1, n).T) for part in motion)
-            points = Points(_lanes(sets, steps), batch.t.ravel(), *states)
+            points = Points(lanes_of(sets, steps), batch.t.ravel(), *states)
             found = slopes_of(code, names, demands.columns, points)
             by = found.reshape(3, len(names), -1, count, steps)
             order_of = [x for x in (*code.coordinates, *code.outputs) if x in demands.columns]
@@ -174,37 +168,15 @@ class Descent:
     def run(self, x: Array, q: Array, starts: int, is_over: Callable[[int], bool]) -> Designs:
         """Follow motions (B, nx), the best first, from positions (B, N, n) to the ends of the best.
 
-        Minima lie near each other: further starts are followed around the best ends.
+        Of many times they are fewer, as memory is bounded.
         """
-        ends = self._followed(x, q, starts, range(FIRST), is_over)
-        for first in range(FIRST, ITERATIONS, AGAIN):
-            if not ends.error.size or ends.error[0] <= REACHED or is_over(first):
-                break
-            x, q = self._around(ends, max(FEWEST, starts), first)
-            steps = range(first, first + AGAIN)
-            ends = Designs.best([ends, self._followed(x, q, starts // 4, steps, is_over)])
-        return ends
-
-    def _around(self, ends: Designs, count: int, seed: int) -> tuple[Array, Array]:
-        """Return variables near the best ends, (count, nx), and the positions there."""
-        rng, which = np.random.default_rng(seed), np.arange(count) % min(BEST, len(ends.x))
-        low, high = np.log(NEAR).tolist()
-        size = np.exp(rng.uniform(low, high, (count, 1)))
-        u = self.variables.to_u(ends.x[which])
-        near = self.variables.within(u + size * rng.normal(size=u.shape))
-        return self.variables.to_x(near), ends.q[which]
-
-    def _followed(
-        self, x: Array, q: Array, starts: int, steps: range, is_over: Callable[[int], bool]
-    ) -> Designs:
-        """Follow motions to the ends of the best; of many times fewer, as memory is bounded."""
         few = slice(max(FEWEST, MOST_POINTS // q.shape[1]))
         batch = self.solved(x[few], q[few])
         batch = batch.some(batch.good)
         if not len(batch.x):
             return Designs.none()
         ends, walk = [], _Walk(self, self.projected(self._placed(batch)))
-        for step, number in enumerate(steps):
+        for step in range(ITERATIONS):
             count, cost = len(walk.u), walk.batch.cost
             if step in KEPT and (most := max(FEWEST, int(KEPT[step] * starts))) < count:
                 rest = np.ones(count, dtype=bool)
@@ -215,7 +187,7 @@ class Descent:
             if walk.is_done.any():
                 ends.append(walk.ends(walk.is_done))
                 walk.drop(walk.is_done)
-            if is_over(number) or not len(walk.u):
+            if is_over(step) or not len(walk.u):
                 break
             walk.step()
         ends.append(walk.ends(slice(None)))
@@ -369,15 +341,10 @@ class _Walk:
         slope = np.einsum("bri,br->bi", by, self.off)
         square = np.einsum("bri,brj->bij", by, by)
         self.scale = np.maximum(self.scale, np.einsum("bii->bi", square))
-        held = ((self.u <= 0) & (slope > 0)) | ((self.u >= 1) & (slope < 0))
-        held &= ~variables.is_turn
         damped = self.damping[:, np.newaxis] * np.where(self.scale > 0, self.scale, 1.0)
         one = np.eye(self.u.shape[1])
         matrix = square + damped[..., np.newaxis] * one
-        is_out = held[:, :, np.newaxis] | held[:, np.newaxis, :]
-        matrix = np.where(is_out, held[..., np.newaxis] * one, matrix)
-        right = np.where(held, 0.0, -slope)[..., np.newaxis]
-        u = self.u + np.linalg.solve(matrix, right)[..., 0]
+        u = self.u + variables.step(self.u, matrix, slope)
         moved = np.where(variables.is_turn, u, np.clip(u, 0.0, 1.0)) - self.u
         x = variables.to_x(variables.within(u))
         trial = descent.projected(descent.solved(x, self.batch.q, self.batch.signs))
@@ -403,7 +370,7 @@ class _Walk:
             self.is_done |= lost
 
 
-def _lanes(sets: Array, steps: int) -> Array:
+def lanes_of(sets: Array, steps: int) -> Array:
     """Return parameters (B, k) of motions for each of their points, (k, B * steps)."""
     return np.ascontiguousarray(np.repeat(sets, steps, axis=0).T)
 

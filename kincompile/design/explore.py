@@ -15,6 +15,7 @@ import numpy as np
 from kincompile.design.descent import ITERATIONS, Descent
 from kincompile.design.designs import Designs
 from kincompile.design.search import Search
+from kincompile.design.together import Together
 from kincompile.design.trial import Workbench
 from kincompile.design.variables import Variables
 
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
 
 PART = 4096
 """Sets of parameters of a part."""
+
+LED = 16
+"""Of that many sets one is led to its targets without being assembled before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +80,9 @@ class Explored:
     followed: int  # starts that were followed
     motions: int  # that were evaluated side by side
     is_cut: bool  # whether the budget was spent before the end
+    # What the model's own values were moved to, (k,), where they do not get through all times;
+    # empty if nothing was found near them.
+    drawn: Array | None
 
 
 def explore(
@@ -118,9 +125,10 @@ def _part(
     search = Search(bench, variables, plan.guesses)
     count = min(PART, plan.samples - number * PART) if plan.search == "sobol" else plan.samples
     (search.spread if plan.search == "sobol" else search.breed)(count, (plan.seed, number))
-    starts = search.found
     every = np.concatenate((plan.bounds, np.reshape(bench.demands.time_bounds(), (-1, 2))))
     descent, budget, is_cut = Descent(bench, Variables(every)), plan.budget, False
+    drawn = _led(search, descent, count // LED, (plan.seed, number))
+    starts = search.found
 
     def is_over(step: int) -> bool:
         nonlocal is_cut
@@ -136,8 +144,28 @@ def _part(
         ends = descent.run(starts.x, starts.q, plan.starts, is_over)
     followed = min(plan.starts, starts.error.size)
     return Explored(
-        starts, ends, search.tried, search.moved, search.farthest, followed, descent.motions, is_cut
-    )
+        starts, ends, search.tried, search.moved, search.farthest, followed, descent.motions,
+        is_cut, drawn,
+    )  # fmt: skip
+
+
+def _led(search: Search, descent: Descent, count: int, seed: tuple[int, int]) -> Array | None:
+    """Try also what the first sets are led to; return what the model's own values are moved to.
+
+    None if those get through the times, empty if nothing near them does.
+    """
+    own = search.drawing()
+    is_stuck = own is not None and np.isinf(search.first)
+    if not (count or is_stuck):
+        return None
+    together, to_u = Together(descent), search.variables.to_u
+    if count:
+        search.scores(to_u(together.led(search.sets(count, seed), search.guesses)))
+    if own is None or not is_stuck:
+        return None
+    near = together.led(np.repeat([own], len(search.guesses), axis=0), search.guesses)
+    errors = search.scores(to_u(near))
+    return near[errors.argmin()] if np.isfinite(errors).any() else own[:0]
 
 
 def _together(parts: list[Explored]) -> Explored:
@@ -151,4 +179,5 @@ def _together(parts: list[Explored]) -> Explored:
         sum(x.followed for x in parts),
         sum(x.motions for x in parts),
         any(x.is_cut for x in parts),
+        parts[0].drawn,
     )

@@ -157,7 +157,9 @@ def fit(
     )  # fmt: skip
     designs = distinct(ends, every, len(names))
     found = [fitted(model, demands, end, names, counts, EXCESS) for end in designs]
-    return replace(found[0], others=tuple(found[1:]), dropped=judged.dropped)
+    drawn = explored.drawn
+    moved = None if drawn is None else dict(zip(names, drawn.tolist(), strict=False))
+    return replace(found[0], others=tuple(found[1:]), dropped=judged.dropped, drawn=moved)
 
 
 def _targets(given: Any, model: Mechanism) -> list[Target]:

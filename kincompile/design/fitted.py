@@ -111,6 +111,9 @@ class Fit(Shown):
         How many ends were dropped for a defect: of ``"order"``, where the points do not come within
         one cycle; of ``"circuit"``, where the motion stops between them; of ``"branch"``, where it
         arrives at another position.
+    drawn : dict, optional
+        Where the values before do not get through the times of the targets: values with which the
+        mechanism does, to which the search has moved them. Empty if it found none near them.
     reached : tuple of Reached
         Every wanted value.
     limits : tuple of Kept
@@ -136,6 +139,7 @@ class Fit(Shown):
     counts: Counts
     others: tuple[Fit, ...] = ()
     dropped: dict[str, int] = field(default_factory=dict)
+    drawn: dict[str, float] | None = None
 
     @property
     def errors(self) -> tuple[float, ...]:
@@ -276,11 +280,26 @@ class Fit(Shown):
             f"Sum of squares {self.error:.6g}; {counts.sampled} sets searched, {counts.starts} "
             f"followed to the end, {counted(counts.motions, 'motion')} in {counts.seconds:.2f} s."
         ]
+        if self.drawn is not None:
+            parts.append(self._moved())
         if counts.is_cut:
             parts.append("The search ended with its budget.")
         if dropped:
             parts.append(f"Dropped for defects: {listed(dropped)}.")
         return " ".join(parts)
+
+    def _moved(self) -> str:
+        """Say which of the values before were moved, and how far."""
+        moved = [
+            f"{name} from {self.before[name]:.4g} to {value:.4g}"
+            for name, value in (self.drawn or {}).items()
+            if f"{value:.4g}" != f"{self.before[name]:.4g}"
+        ]
+        what = f"moved {listed(moved)}, and began there" if moved else "began with others"
+        return (
+            "With the values before it does not get through the times of the targets; the search "
+            f"{what}."
+        )
 
     def to_text(self) -> str:
         """Return dimensions, targets and limits as tables."""

@@ -49,16 +49,19 @@ class Judged:
 def judge(bench: Workbench, explored: Explored, bounds: Array) -> Judged:
     """Return the best ends, or else the best starts, whose motions are whole."""
     found: list[Trial] = []
+    count = len(bench.names)
     dropped = dict.fromkeys(("order", "circuit", "branch"), 0)
     for number, own in enumerate((explored.ends, explored.starts)):
         tried: list[Array] = []
-        for x, t, q in zip(own.x, own.t, own.q, strict=True):
+        for x, q in zip(own.x, own.q, strict=True):
             if len(found) == DESIGNS or len(tried) == MOST_TRIED or (number and found):
                 break
             x = np.clip(x, *bounds.T)
+            x[count:] = bench.demands.within(x[count:])
             if any(_is_one(x, other, bounds) for other in tried):
                 continue
             tried.append(x)
+            t = np.concatenate([bench.demands.grid, *bench.demands.instants(x[count:])])
             trial = bench.solved(x, q[t.argmin()])
             if defect := _defect(bench, trial, t, q, is_start=number == 1):
                 dropped[defect] += 1

@@ -71,6 +71,7 @@ class Search:
     tried: int = 0
     moved: int = 0
     farthest: float = -np.inf  # the latest time that a set has reached
+    first: float = np.nan  # the error of the first set, infinite where it does not get through
     found: Designs = field(default_factory=Designs.none)  # the best ones first
     _times: Array = field(default_factory=lambda: np.empty(0))
 
@@ -84,15 +85,23 @@ class Search:
 
     def spread(self, count: int, seed: Sequence[int]) -> None:
         """Try sets that are spread evenly over the bounds, and the defaults first."""
-        self.scores(self._parts(count, seed))
+        self._tried(self._parts(count, seed))
+
+    def sets(self, count: int, seed: Sequence[int]) -> Array:
+        """Return the first sets (count, k) that are tried."""
+        return self.variables.to_x(self._parts(count, seed))
+
+    def drawing(self) -> Array | None:
+        """Return the values that the model has, (k,), where they lie within the bounds."""
+        defaults = code_of(self.bench.module).defaults
+        x = defaults[[self.bench.module.PARAMETERS.index(name) for name in self.bench.names]]
+        return x if self.variables.hold(x) else None
 
     def _parts(self, count: int, seed: Sequence[int]) -> Array:
         """Return numbers of the unit interval, (count, k), by Sobol's sequence."""
         sequence = qmc.Sobol(self.variables.low.size, seed=np.random.default_rng(seed))
         parts = np.asarray(sequence.random_base2(max(1, (count - 1).bit_length()))[:count])
-        defaults = code_of(self.bench.module).defaults
-        x = defaults[[self.bench.module.PARAMETERS.index(name) for name in self.bench.names]]
-        if self.variables.hold(x):
+        if (x := self.drawing()) is not None:
             parts[0] = self.variables.to_u(x)
         return parts
 
@@ -101,7 +110,7 @@ class Search:
         parts = self._parts(count, seed)
 
         def score(columns: Array) -> Array:
-            found = self.scores(np.clip(np.atleast_2d(columns.T), 0.0, 1.0))
+            found = self._tried(np.clip(np.atleast_2d(columns.T), 0.0, 1.0))
             return np.where(np.isfinite(found), found, 1e30)
 
         _SCIPY.differential_evolution(
@@ -109,6 +118,14 @@ class Search:
             seed=np.random.default_rng(seed), vectorized=True, updating="deferred", polish=False,
             tol=1e-3,
         )  # fmt: skip
+
+    def _tried(self, parts: Array) -> Array:
+        """Return the scores of sets, and count them."""
+        found = self.scores(parts)
+        if not self.tried:
+            self.first = float(found[0])
+        self.tried += len(parts)
+        return found
 
     def scores(self, parts: Array) -> Array:
         """Return the least error of each set over its assemblies, infinite where it has none."""
@@ -120,7 +137,6 @@ class Search:
             for guess in self.guesses:
                 own = self._scored(some, guess)
                 found[first : first + len(some)] = np.minimum(found[first : first + len(some)], own)
-        self.tried += len(values)
         return found
 
     def _scored(self, values: Array, guess: Array) -> Array:

@@ -49,6 +49,16 @@ class Variables:
         """Return numbers of the unit interval: whole turns are left out, others end at its ends."""
         return np.where(self.is_turn, u % 1.0, np.clip(u, 0.0, 1.0))
 
+    def step(self, u: Array, matrix: Array, slope: Array) -> Array:
+        """Return Newton's steps (B, nx); what is at an end of its bounds does not leave them."""
+        held = ((u <= 0) & (slope > 0)) | ((u >= 1) & (slope < 0))
+        held &= ~self.is_turn
+        is_out = held[:, :, np.newaxis] | held[:, np.newaxis, :]
+        one = np.eye(u.shape[1])
+        matrix = np.where(is_out, held[..., np.newaxis] * one, matrix)
+        right = np.where(held, 0.0, -slope)[..., np.newaxis]
+        return np.asarray(np.linalg.solve(matrix, right)[..., 0])
+
     def around(self, x: Array) -> Array:
         """Return variables without whole turns."""
         return np.where(self.is_turn, self.low + (x - self.low) % (2 * math.pi), x)
