@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Rows = tuple[Array, Array, Array]
 
-STEPS, PULLS = 20, 8
+STEPS, PULLS = 20, 4
 """Steps of a start; of its positions alone at each time, before that."""
 
 STIFFNESS = (0.1, 100.0)

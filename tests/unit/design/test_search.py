@@ -250,13 +250,17 @@ def test_that_a_drawing_is_used_which_cannot_be_assembled_at_the_times():
 
 
 @pytest.mark.filterwarnings("ignore::kincompile.errors.KincompileWarning")
-def test_that_a_drawing_is_moved_to_where_it_goes_round_without_points_to_reach():
-    m = four_bar("drawn", r2=2.5, r3=2.4)
-    still = kc.targets.circular("P", (0.0, 2 * math.pi), within=10.0)
-    found = kc.fit(m, still, bounds={"r2": (0.2, 3), "r3": (2, 6)}, samples=1, starts=1)
+def test_that_a_drawing_is_moved_where_there_are_no_points_to_reach():
+    """To where it is just assembled at the end, and a little further, as it is singular there."""
+    m, t = four_bar("drawn", r2=2.5, r3=2.4, u=1.0, v=1.0), np.linspace(1.0, 2.0, 25)
+    straight = kc.targets.straight("P", (1.0, 2.0), within=1.0)
+    bounds = dict.fromkeys(("r3", "r4"), (2, 6)) | dict.fromkeys(("u", "v"), (-3, 3))
+    bounds |= {"r2": (0.2, 3)}
+    found = kc.fit(m, straight, bounds=bounds, samples=1, starts=1)
     assert found.drawn
-    moved = kc.solve(kc.compile(m), np.linspace(0, 2 * math.pi, 73), found.drawn)
-    assert moved.success
+    module = kc.compile(m)
+    assert not kc.solve(module, t).success
+    assert kc.solve(module, t, found.drawn).success
 
 
 def test_that_a_drawing_near_which_nothing_is_assembled_is_refused():
