@@ -72,8 +72,8 @@ class Together:
         Each begins with one of the guesses (g, n) in turn. What can only just be assembled is
         singular: there are also parameters a little further on.
         """
-        most = MOST_ENTRIES // (len(self._times_by) * self._code.constant.size)
-        values = values[: max(1, most)]
+        entries = len(self._times_by) * len(self._code.equations) * guesses.shape[1]
+        values = values[: max(1, MOST_ENTRIES // entries)]
         times = np.repeat([self._even_times()], len(values), axis=0)
         x = np.concatenate((values, times), axis=1)
         with np.errstate(all="ignore"):
@@ -156,13 +156,12 @@ class Together:
         """Return Phi (B, N, m) and Phi_q (B, N, m, n)."""
         code, (count, steps, n) = self._code, q.shape
         at = Planned(code, lanes_of(sets, steps)).evaluate(q.reshape(-1, n).T, t.ravel())
-        by = np.broadcast_to(code.constant, (count * steps, *code.constant.shape)).copy()
+        by = np.zeros((count * steps, len(code.equations), n))
         varying = iter(at.Phi_q)
         for row, column, number in code.entries:
-            if number is None:
-                by[:, row, column] = next(varying)
+            by[:, row, column] = next(varying) if number is None else number
         Phi = stacked(at.Phi, count * steps).T
-        return Phi.reshape(count, steps, -1), by.reshape(count, steps, *code.constant.shape)
+        return Phi.reshape(count, steps, -1), by.reshape(count, steps, -1, n)
 
     def rows(self, x: Array, q: Array) -> Rows:
         """Return equations and deviations of targets (B, N, R), by positions and by variables.
