@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 PART = 4096
 """Sets of parameters of a part."""
 
-LED = 16
+LED = 32
 """Of that many sets one is led to its targets without being assembled before."""
 
 

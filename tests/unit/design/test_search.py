@@ -254,8 +254,8 @@ def test_that_a_drawing_is_moved_where_there_are_no_points_to_reach():
     """To where it is just assembled at the end, and a little further, as it is singular there."""
     m, t = four_bar("drawn", r2=2.5, r3=2.4, u=1.0, v=1.0), np.linspace(1.0, 2.0, 25)
     straight = kc.targets.straight("P", (1.0, 2.0), within=1.0)
-    bounds = dict.fromkeys(("r3", "r4"), (2, 6)) | dict.fromkeys(("u", "v"), (-3, 3))
-    bounds |= {"r2": (0.2, 3)}
+    bounds = {"r2": (0.2, 3.0), "r3": (2.0, 6.0), "r4": (2.0, 6.0)}
+    bounds |= dict.fromkeys(("u", "v"), (-3.0, 3.0))
     found = kc.fit(m, straight, bounds=bounds, samples=1, starts=1)
     assert found.drawn
     module = kc.compile(m)
