@@ -131,7 +131,7 @@ def rows(times: dict[str, Timing], skipped: dict[str, str]) -> Iterator[list[str
     """Give a row per contender, the fastest first; those that could not run with the reason."""
     plain = times.get(PLAIN)
     for name, timing in sorted(times.items(), key=lambda item: item[1].median):
-        shown = f"**{name}**" if name in (NUMPY, C) else name
+        shown = f"**{name}**" if name.startswith("kincompile") else name
         ratio = f"{timing.median / plain.median:.3g}" if plain else ""
         yield [shown, f"{timing.median * 1e3:.3g} ({timing.least * 1e3:.3g})", ratio]
     for name, reason in skipped.items():

@@ -1,13 +1,19 @@
 """Whole analyses in space, beside plain C and CasADi's generated C, and building.
 
-`python -m benchmarks.space [points]` prints a table per mechanism. The peers get the same joints,
-with the triads that kincompile chooses, and the driver in the sine form; the lengths are numbers.
+`python -m benchmarks.space [points] [names]` prints a table per mechanism. The peers get the same
+joints, with the triads that kincompile chooses, and the driver in the sine form; the lengths are
+numbers. All C but that of `kc.compile(m, target="c")` is compiled once by gcc -O3, with the same
+flags, and what that takes is not counted.
 """
 
 from __future__ import annotations
 
+import ctypes
+import resource
 import sys
+import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,18 +23,67 @@ import kincompile as kc
 from benchmarks import analysis, machine
 from benchmarks.linkages import GROUND, POINTS, Constraint, Linkage
 from benchmarks.peers import casadi_peer, plain_c
+from benchmarks.peers.common import MAX_ITERATIONS, TOLERANCE, Skipped, compiled_c
 from benchmarks.tables import Target, print_table, print_targets
 from benchmarks.timing import in_turn
 from kincompile import spatial
+from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.native import points
+from kincompile.runtime.problem import problem
 from kincompile.space.triads import with_triads
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from benchmarks.peers.common import Analysis, Motion, Vector
     from benchmarks.timing import Timing
+
+EMITTED = "kincompile, emitted C, gcc -O3"
+LARGE = ("-D_WHOLE_REGISTERS", "-fno-inline-functions", "-fno-ipa-cp-clone")
+"""Flags of docs/in_c.md for large mechanisms: they save gcc's time alone."""
+
+
+def emitted(linkage: Linkage) -> Analysis:
+    """Return the march of emitted C, compiled as docs/in_c.md says; what gcc takes is printed.
+
+    In-process `kc.compile(m, target="c")` takes points of a large mechanism one by one, so that a
+    first motion does not wait for gcc.
+    """
+    module = kc.compile(linkage.mechanism())
+    code, first = code_of(module), kc.solve(module, 0.0, throw=True).q[0].copy()
+    size = problem(code, code.defaults, first, 0.0).size
+    start = sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
+    with tempfile.TemporaryDirectory() as folder:
+        files = kc.emit(linkage.mechanism(), "c").files
+        for name, text in files.items():
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        library = compiled_c(Path(folder) / f"{code.name}.c", *LARGE)
+    took = sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2]) - start
+    print(
+        f"gcc took {took:.1f} s for {code.name}, of {len(files[f'{code.name}.c']):,} characters.\n"
+    )
+    march = getattr(library, f"{code.name}_march")
+    march.restype = ctypes.c_size_t
+
+    def analyse(times: Vector) -> Motion:
+        states, residual = np.empty((3, first.size, times.size)), np.empty(times.size)
+        status, iterations = np.empty((2, times.size), np.intc)
+        given = (x.ctypes.data for x in (times, code.defaults, first))
+        motion = points.Motion(times.size, *given, size, TOLERANCE, MAX_ITERATIONS)
+        motion.q, motion.q_dot, motion.q_ddot = map(points.numbers_of_batch, states)
+        said = (x.ctypes.data for x in (residual, status, iterations))
+        motion.residual, motion.status, motion.iterations = said
+        if march(ctypes.byref(motion)) < times.size:
+            raise Skipped("the march did not reach the end")
+        q, q_dot, q_ddot = (state.T for state in states)
+        return q, q_dot, q_ddot
+
+    return analyse
+
 
 BUILDERS: analysis.Builders = {
     analysis.NUMPY: lambda linkage: analysis.kincompile(linkage, "numpy"),
+    EMITTED: emitted,
     analysis.C: lambda linkage: analysis.kincompile(linkage, "c"),
     analysis.PLAIN: lambda linkage: plain_c.PlainC(linkage).analysis(is_predicted=False),
     analysis.PREDICTED: lambda linkage: plain_c.PlainC(linkage).analysis(is_predicted=True),
@@ -372,27 +427,30 @@ LIMITS = {
     "platform": (analysis.GENERATED, 0.9, 0.3),
     "pump": (analysis.GENERATED, 0.9, 0.3),
 }
-"""The contender beside which NumPy and C may take at most such parts of its time."""
+"""The contender beside which NumPy and emitted C may take at most such parts of its time."""
 A_COORDINATE = ("delta", "double_wishbone", 1.5)
 """Emitted C for the one may take so many times as long a coordinate as for the other."""
 
 
-def main(points: int) -> None:
+def main(count: int, names: Sequence[str]) -> None:
     """Measure and print."""
     before, targets, a_coordinate = machine.load(), list[Target](), dict[str, float]()
     for linkage in LINKAGES:
-        analyses, skipped = analysis.build(linkage, points, BUILDERS)
-        times = analysis.measure(analyses, linkage.times(points))
+        if names and linkage.name not in names:
+            continue
+        analyses, skipped = analysis.build(linkage, count, BUILDERS)
+        times = analysis.measure(analyses, linkage.times(count))
         print_table(
-            f"{linkage.name}, {points} points, {len(linkage.guess)} coordinates",
+            f"{linkage.name}, {count} points, {len(linkage.guess)} coordinates",
             ("contender", "ms, median (least)", "x plain C"),
             analysis.rows(times, skipped),
         )
         targets += list(reached(linkage, times))
-        a_coordinate[linkage.name] = times[analysis.C].median / len(linkage.guess)
+        a_coordinate[linkage.name] = times[EMITTED].median / len(linkage.guess)
     one, other, limit = A_COORDINATE
-    ratio = a_coordinate[one] / a_coordinate[other]
-    targets.append(Target(f"C a coordinate: {one} / {other}", ratio, "at most", limit))
+    if {one, other} <= a_coordinate.keys():
+        ratio = a_coordinate[one] / a_coordinate[other]
+        targets.append(Target(f"C a coordinate: {one} / {other}", ratio, "at most", limit))
     print_targets("Whole analyses in space: what was to be reached, ratios of medians", targets)
     print(f"{machine.description()}. Load before {before}, after {machine.load()}.")
 
@@ -400,7 +458,7 @@ def main(points: int) -> None:
 def reached(linkage: Linkage, times: dict[str, Timing]) -> Iterator[Target]:
     """Compare with what was to be reached."""
     peer, *limits = LIMITS.get(linkage.name, (analysis.PLAIN,))
-    for name, limit in zip((analysis.NUMPY, analysis.C), limits, strict=False):
+    for name, limit in zip((analysis.NUMPY, EMITTED), limits, strict=False):
         if peer in times:
             ratio = times[name].median / times[peer].median
             yield Target(f"{linkage.name}: {name} / {peer}", ratio, "at most", limit)
@@ -413,4 +471,4 @@ def reached(linkage: Linkage, times: dict[str, Timing]) -> Iterator[Target]:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else POINTS)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else POINTS, sys.argv[2:])

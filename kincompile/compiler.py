@@ -139,7 +139,7 @@ def emit(
         start = Start(real) if points == "one" else None
         emitted, found = transmission_files(system, language, *transmission, start=start)
         return emitted if language == target else _unit(emitted, found, system)
-    with _without_collector(system):
+    with _without_collector():
         system = further.held_system(system)
         if form == "grouped" and (sensitivities or dynamics):
             what = "sensitivities" if sensitivities else "equations of motion"
@@ -237,15 +237,14 @@ def transmission_files(
 
 
 @contextmanager
-def _without_collector(system: ConstraintSystem) -> Iterator[None]:
-    """Pause Python's collector of cycles for a large mechanism.
+def _without_collector() -> Iterator[None]:
+    """Pause Python's collector of cycles.
 
-    Its many small values all stay, and the collector would walk over them again and again: 9,000
-    coordinates take 1.16 times as long with it. Up to 900 coordinates there is no difference.
+    The many small values of a mechanism all stay, and the collector would walk over them again and
+    again: 90,000 coordinates take 1.16 times as long with it. Up to 900 there is no difference.
     """
     was_enabled = gc.isenabled()
-    if len(system.coordinates) > further.LARGEST_INLINE:
-        gc.disable()
+    gc.disable()
     try:
         yield
     finally:
@@ -377,9 +376,8 @@ def compile(  # noqa: A001 - the public name kc.compile
     UnsupportedError
         If there is no such target, it cannot print the mechanism, or there is no C compiler.
     """
-    system = system_of(model)
-    with _without_collector(system):
-        system = further.held_system(system)
+    with _without_collector():
+        system = further.held_system(system_of(model))
         target = _loadable(target, system, form)
         code = _lowered(system, form)
         compiled = further.loaded(code, target)

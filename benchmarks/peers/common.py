@@ -58,13 +58,17 @@ def derived(linkage: Linkage) -> textbook.Derived:
     return textbook.derive(textbook.Equations(q, q_dot, p, sympy.Matrix(rows)))
 
 
-def compiled_c(source: Path) -> ctypes.CDLL:
+FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math")
+"""Those of docs/in_c.md, for everyone's C."""
+
+
+def compiled_c(source: Path, *more: str) -> ctypes.CDLL:
     """Compile a C file for this machine, -O3, and load it."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
         raise Skipped("no C compiler")
     library = source.with_suffix(".so")
-    options = ("-O3", "-march=native", "-shared", "-fPIC", "-w")
+    options = (*FLAGS, *more, "-shared", "-fPIC", "-w")
     subprocess.run([compiler, *options, str(source), "-o", str(library), "-lm"], check=True)
     return ctypes.CDLL(str(library))
 

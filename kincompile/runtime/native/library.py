@@ -88,7 +88,7 @@ LARGEST_AT_ONCE, LARGEST_VECTORIZED = 302_000, 1_200_000
 first motion waits for, and in those that are built on request. An angle's cosine and sine, which
 are written in line, count as ANGLE. gcc combines instructions in time that grows with the square of
 a function's length: it takes 1.4 s for a Delta robot, and half of that where points are taken one
-by one, at half the speed; for a platform of 91 coordinates 10 s and 5 s."""
+by one, at half the speed; for a platform of 91 coordinates 10 s and 5 s. CC may ask for more."""
 ANGLE = 3_000
 
 LONGEST_OPTIMIZED = 400_000
@@ -115,14 +115,9 @@ def library(name: str, files: Mapping[str, str], fingerprint: str, part: Part = 
     of itself. An `UnsupportedError` says what is wrong with the compiler.
     """
     source = next(iter(files.values()))
-    command = (
-        *_compiler(),
-        *_understood(_compiler()[0], _level(source, part.level)),
-        *FLAGS,
-        *OWN,
-        *part.only,
-        *_machine_flags(),
-    )
+    compiler = _compiler()
+    level = _understood(compiler[0], _level(source, part.level))
+    command = _command(compiler, *level, *FLAGS, *OWN, *part.only, *_machine_flags())
     digest = hashlib.sha256()
     for text in (*command, _version(command[0]), _processor(), *files, *files.values()):
         digest.update(text.encode() + b"\0")
@@ -164,7 +159,7 @@ def shared_library(files: Mapping[str, str]) -> bytes | None:
         return None
     # Points come one by one: loops over many of them, which -O3 is for, gain nothing.
     level = _level(max(files.values(), key=len), ("-O1",))
-    command = (*compiler, *level, *FLAGS, "-fvisibility=hidden")
+    command = _command(compiler, *level, *FLAGS, "-fvisibility=hidden")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as temporary:
         built = _built(command, Path(temporary), files)
         _try(built, next(iter(files)))
@@ -179,6 +174,12 @@ def _level(source: str, wanted: tuple[str, ...]) -> tuple[str, ...]:
     if size <= LARGEST_AT_ONCE:
         return wanted
     return QUICK if wanted == FULL and size <= LARGEST_VECTORIZED else ("-O1",)
+
+
+def _command(compiler: tuple[str, ...], *flags: str) -> tuple[str, ...]:
+    """Return a compiler with flags; options that CC names come last, and have the last word."""
+    first = next((k for k, x in enumerate(compiler) if x.startswith("-")), len(compiler))
+    return (*compiler[:first], *flags, *compiler[first:])
 
 
 def _compiler() -> tuple[str, ...]:

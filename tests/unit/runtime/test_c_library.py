@@ -167,13 +167,15 @@ def test_a_compiler_that_compiles_something_else_is_found_out(compiler, cache):
 
 
 @pytest.mark.slow
-def test_arguments_beside_the_name_reach_the_compiler(monkeypatch, compiler, cache, tmp_path):
+@pytest.mark.parametrize("before", ["", "env "])
+def test_options_beside_the_name_have_the_last_word(monkeypatch, compiler, cache, tmp_path, before):
     compiler(f'echo "$@" > {tmp_path}/seen; exec REAL "$@"')
-    monkeypatch.setenv("CC", f"{os.environ['CC']} -DEXTRA=1")
+    monkeypatch.setenv("CC", f"{before}{os.environ['CC']} -DEXTRA=1")
     assert_right(kc.compile(tiny(), target="c"))
     seen = (tmp_path / "seen").read_text()
-    assert seen.startswith("-DEXTRA=1 -O2 -D_WHOLE_REGISTERS ")
+    assert seen.startswith("-O2 -D_WHOLE_REGISTERS ")
     assert " -std=c99 " in seen
+    assert " -DEXTRA=1 -fPIC " in seen
 
 
 @pytest.mark.parametrize(
