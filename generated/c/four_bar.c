@@ -653,12 +653,12 @@ _always_inline void copy(double *to, const double *from, size_t size, int is_far
     memcpy(to, from, size * sizeof *to);
 }
 
-// Fetch the place of the strip that comes next, while that is computed.
+// Fetch the place of the strip that comes next into the second cache, while that is computed.
 _always_inline void fetch(const double *to)
 {
 #ifdef __GNUC__
     for (int k = 0; k < LANES; k += 8)
-        __builtin_prefetch(to + k, 1);
+        __builtin_prefetch(to + k, 0, 2);
 #endif
     (void)to;
 }
