@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kincompile.criteria import STEP_TOLERANCE
+from kincompile.criteria import ZERO
 from kincompile.ir.interpret import interpreter
 from kincompile.ir.lower import lower
 from kincompile.model.expressions import as_sympy
@@ -55,8 +55,8 @@ def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], lis
                 counted = _over_turns(counted, ends)
             for sign, most in zip((-1.0, 1.0), ends, strict=True):
                 beyond = sign * (counted - most)
-                if beyond.max() > STEP_TOLERANCE:  # less may be rounding errors
-                    first, last = int(np.argmax(beyond > STEP_TOLERANCE)), int(np.argmax(beyond))
+                if beyond.max() > ZERO:  # less may be rounding errors
+                    first, last = int(np.argmax(beyond > ZERO)), int(np.argmax(beyond))
                     sentences.append(
                         f"Joint {limit.joint} leaves its limit of {most:.6g} "
                         f"{unit if unit == 'rad' else system.length_unit} at t = {t[first]:.10g}; "
