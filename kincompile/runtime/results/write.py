@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,9 @@ MOTION, OUTPUTS = ("q", "q_dot", "q_ddot"), ("y", "y_dot", "y_ddot")
 """Arrays whose columns have units."""
 ENDS = ("status", "residual", "iterations")
 """Arrays of a solution with one number a point."""
+
+WIDTH = 100
+"""Characters of a line of text."""
 
 _NUMBERS = ("min", "at t", "max", "max |speed|", "max |acceleration|")
 
@@ -166,10 +170,10 @@ def summary(solution: Solution, angle_unit: str = "rad") -> str:
 
     Of variants there is a table with a line for each. The outputs of
     `Solution.measures` come first, its drivers and four-bars after the coordinates. Per coordinate
-    there are the unit, the least and largest value with their times, and the largest absolute
-    values of first and second derivative [unit/s, unit/s^2]; at the end stand the points by status,
-    the Newton iterations and the largest residual. Points that were not found do not count;
-    `angle_unit` is ``"rad"`` or ``"deg"``.
+    that moves there are the unit, the least and largest value with their times, and the largest
+    absolute values of first and second derivative [unit/s, unit/s^2]; a line names those at rest.
+    At the end stand the points by status, the Newton iterations and the largest residual. Points
+    that were not found do not count; `angle_unit` is ``"rad"`` or ``"deg"``.
     """
     if solution.q.ndim > 2:
         return "\n".join(_variants(solution, angle_unit))
@@ -207,16 +211,20 @@ def variant_named(solution: Solution, number: int) -> str:
 
 
 def _table(solution: Solution, angle_unit: str) -> list[str]:
-    """Return the lines of the table of coordinates."""
+    """Return the lines of the table of coordinates, and a line on those that never move."""
     motion = solution.q, solution.q_dot, solution.q_ddot
     shown = [without_noise(values, largest(values)).T for values in motion]
-    rows = []
+    rows, rest = [], []
     for name, q, q_dot, q_ddot in zip(solution.coordinates, *shown, strict=True):
         unit, factor = shown_unit(solution.units[name], angle_unit)
+        if solution.t.size > 1 and not (np.ptp(q) or q_dot.any() or q_ddot.any()):
+            rest.append(f"{name} = {_text(factor * q[0])} {unit}".rstrip())
+            continue
         rates = (_text(largest(factor * part)) for part in (q_dot, q_ddot))
         rows.append([name, unit, *_extremes(solution.t, factor * q), *rates])
     header = ("coordinate", "unit", "min", "at t", "max", "at t", *_NUMBERS[3:])
-    return table(header, rows, right=_NUMBERS)
+    lines = table(header, rows, right=_NUMBERS) if rows or not rest else []
+    return [*lines, *textwrap.wrap(f"at rest: {', '.join(rest)}", WIDTH)] if rest else lines
 
 
 def _extremes(t: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[str, str, str, str]:

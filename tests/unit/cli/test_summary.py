@@ -56,6 +56,13 @@ def test_that_a_motion_of_which_nothing_was_found_has_dashes(solution):
     assert text.endswith("largest residual -")
 
 
+def test_that_what_never_moves_is_one_line(solution):
+    text = summary(solution([3, 3, 3], [0, 0, 0], [0, 0, 0], [0, 0, 0]))
+    assert text.splitlines()[0] == "at rest: x = 3 m"
+    assert "max" not in text
+    assert "at rest" not in summary(solution([3, 3], [0, 1e-6], [0, 0], [0, 0]))
+
+
 @pytest.mark.parametrize(("small", "shown"), [(1e-15, "0"), (1e-9, "1e-09")])
 def test_that_rounding_errors_are_shown_as_zero_and_small_numbers_as_they_are(
     solution, small, shown
