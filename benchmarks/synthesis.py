@@ -212,7 +212,7 @@ NINE = (
 CASES = (
     Case("18 points, closed", CLOSED, True, (0.05, 50), (-50, 50), 0.0090289),
     Case("6 points on a line", LINE, False, (5, 60), (-60, 60), 1e-12),
-    Case("10 points of an ellipse", ELLIPSE, False, (5, 80), (-80, 80), 0.0034),
+    Case("10 points of an ellipse", ELLIPSE, False, (5, 80), (-80, 80), 4.85e-4),
 )
 NINE_POINTS = Case(
     "9 points", NINE, False, (0.1, 5), (-5, 5), 1e-8, {"samples": 24576, "starts": 128}
