@@ -30,7 +30,7 @@ RELEASE_READY := $(VENV)/release.stamp
 
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help ready demo test test-all test-slow test-elsewhere lint format types budget goldens update-goldens docs pictures course bench matrix clean
+.PHONY: help ready demo test test-all test-slow test-elsewhere lint format types budget goldens update-goldens docs pictures course bench bench-table matrix clean
 
 help:
 	@echo "make demo            compile the wrecker boom, run it, show it on a page"
@@ -180,6 +180,9 @@ $(BENCH_READY): $(DEMO_READY)
 bench: $(BENCH_READY)
 	@$(BIN)/python -m benchmarks
 	@for part in points analysis space stepper in_jax outputs sensitivities forces forward scale variants sweep synthesis page; do $(BIN)/python -m benchmarks.$$part || exit 1; done
+
+bench-table: $(BENCH_READY)
+	@$(BIN)/python -m benchmarks.table
 
 $(RELEASE_READY): $(DEMO_READY)
 	@echo "Installing what builds and installs a release into $(VENV)"

@@ -21,7 +21,8 @@ from benchmarks.tables import Target, print_table, print_targets
 from benchmarks.timing import in_turn
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Collection, Iterator
+    from types import ModuleType
 
     from benchmarks.timing import Timing
 
@@ -73,16 +74,22 @@ def builders() -> Builders:
 
 def kincompile(linkage: Linkage, target: str) -> Analysis:
     """Return the analysis by kincompile."""
-    try:
-        module = kc.compile(linkage.mechanism(), target=target)
-    except kc.UnsupportedError as error:
-        raise Skipped(str(error)) from None
+    module = module_of(linkage, target)
 
     def analyse(times: Vector) -> Motion:
         solution = kc.solve(module, times, throw=True)
         return solution.q, solution.q_dot, solution.q_ddot
 
     return analyse
+
+
+def module_of(linkage: Linkage, target: str) -> ModuleType:
+    """Return the compiled module."""
+    try:
+        module: ModuleType = kc.compile(linkage.mechanism(), target=target)
+    except kc.UnsupportedError as error:
+        raise Skipped(str(error)) from None
+    return module
 
 
 def build(
@@ -112,19 +119,24 @@ def _require_equal(name: str, found: Motion, wanted: Motion) -> None:
         np.testing.assert_allclose(one, other, rtol=0, atol=AGREEMENT * size, err_msg=name)
 
 
-def measure(analyses: dict[str, Analysis], t: Vector) -> dict[str, Timing]:
+def measure(
+    analyses: dict[str, Analysis],
+    t: Vector,
+    slow: Collection[str] = SLOW,
+    rounds: int = ROUNDS,
+) -> dict[str, Timing]:
     """Time the contenders in turn, the slow ones in fewer rounds."""
 
     def calls(*, is_slow: bool) -> dict[str, Callable[[], object]]:
         return {
             name: partial(analysis, t)
             for name, analysis in analyses.items()
-            if (name in SLOW) == is_slow
+            if (name in slow) == is_slow
         }
 
-    fast = in_turn(calls(is_slow=False), calls=1, rounds=ROUNDS)
-    slow = in_turn(calls(is_slow=True), calls=1, rounds=SLOW_ROUNDS)
-    return fast | slow
+    fast = in_turn(calls(is_slow=False), calls=1, rounds=rounds)
+    last = in_turn(calls(is_slow=True), calls=1, rounds=SLOW_ROUNDS)
+    return fast | last
 
 
 def rows(times: dict[str, Timing], skipped: dict[str, str]) -> Iterator[list[str]]:

@@ -9,7 +9,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from kincompile.errors import KincompileError
-from kincompile.sweeps.worker import run
+from kincompile.sweeps.worker import packed, run, run_packed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -47,7 +47,7 @@ def solved(
                 raise StoppedError(_named(error)) from error
             yield number, values
         return
-    left = iter(numbers)
+    left, sent = iter(numbers), packed(job)
     waiting: dict[Future[Values], int] = {}
     # Each future reports itself: to ask all that wait would cost more the more there are.
     finished: SimpleQueue[Future[Values]] = SimpleQueue()
@@ -56,7 +56,7 @@ def solved(
         while True:
             for number in islice(left, most - len(waiting)):
                 with _of_executor():
-                    future = executor.submit(run, job, number, plan.sets(number))
+                    future = executor.submit(run_packed, sent, number, plan.sets(number))
                 waiting[future] = number
                 future.add_done_callback(finished.put)
             if not waiting:

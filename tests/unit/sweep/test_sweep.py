@@ -295,3 +295,20 @@ def test_workers_know_the_points_of_joints():
         found = sweep(columns=["A.x_dot", "tip.x"], executor=pool, chunk=8).to_xarray()
     assert (found["status"] == 0).all()
     np.testing.assert_allclose(found["x_A_dot"], 0, atol=1e-13)
+
+
+def test_that_what_all_chunks_share_is_packed_once():
+    sent = []
+
+    class Recorded(ThreadPoolExecutor):
+        def submit(self, function, /, *given, **named):
+            sent.append(given[0])
+            return super().submit(function, *given, **named)
+
+    sets = {"a": np.linspace(0.1, 1.0, 12)}
+    with Recorded(1) as executor:
+        found = kc.sweep(crank(), sets, TIMES, target="numpy", chunk=3, executor=executor)
+    alone = kc.sweep(crank(), sets, TIMES, target="numpy", chunk=3)
+    assert len(sent) == 4
+    assert all(job is sent[0] and type(job) is bytes for job in sent)
+    np.testing.assert_array_equal(found.to_xarray()["x_tip"], alone.to_xarray()["x_tip"])
