@@ -1,7 +1,7 @@
 """Eight mechanisms beside six peers in one table.
 
 `python -m benchmarks.table [mechanism ...]` measures those named, or all, and prints the table;
-`--points N` takes fewer times than 2,000, `--write` puts it into README.md.
+`--points N` takes other than 10,000 times, `--write` puts it into both pages of README.md.
 The rules are in benchmarks/README.md. Mechanisms are those of linkages.py and space.py, with their
 data and units; what is measured, and how, is analysis.py's.
 """
@@ -49,12 +49,17 @@ OURS: analysis.Builders = {
 }
 LESS_WORK = {"dyads in NumPy"}
 """Peers that give positions of joints alone."""
-POINTS, ROUNDS, PATIENCE = 2_000, 7, 20
+POINTS, ROUNDS, PATIENCE = 10_000, 7, 20
 """Times of a turn, how often each contender has its turn, seconds of the processor for building."""
 SAME, AGREEMENT = 1e-12, 1e-10
 """How far our positions may miss the peers' equations, and theirs our positions, in parts of the
 largest: peers end Newton's method at 1e-10."""
 PAGE = Path(__file__).with_name("README.md")
+README, IN_README = (
+    PAGE.parents[1] / "README.md",
+    {analysis.NUMPY, "plain C", "CasADi, its C", "JAX", *LESS_WORK},
+)
+"""The first page, and the contenders whose rows it has."""
 BEGIN, END = "<!-- python -m benchmarks.table --write -->\n", "<!-- end of the table -->\n"
 
 
@@ -77,7 +82,8 @@ def main() -> None:
                 print(f"{name}, {contender}: {why}")
     print(f"\n{machine.description()}. Load before {before}, after {machine.load()}.")
     if given.write:
-        PAGE.write_text(with_table(PAGE.read_text("utf-8"), (heads, *rows)), "utf-8")
+        for page, shown in ((PAGE, rows), (README, rows_of_readme(rows))):
+            page.write_text(with_table(page.read_text("utf-8"), (heads, *shown)), "utf-8")
 
 
 def measure(linkage: Linkage, points: int, peers: analysis.Builders = PEERS) -> Found:
@@ -137,6 +143,12 @@ def table(measured: Mapping[str, Found], points: int) -> list[list[str]]:
         for name in (analysis.NUMPY, *PEERS)
     ]
     return rows
+
+
+def rows_of_readme(rows: list[list[str]]) -> list[list[str]]:
+    """Return the rows of the table that the first page has."""
+    first, *others = rows
+    return [first, *(row for row in others if row[0].removesuffix(" / C") in IN_README)]
 
 
 def _us(found: Timing | str, points: int) -> str:
