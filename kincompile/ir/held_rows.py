@@ -77,8 +77,7 @@ def holding(
             rows.append(row / np.linalg.norm(row))
             weights.append(ANGLES_FIRST * (ANGLES_FIRST if len(axes) == 1 else 1.0))
             wanted.append((body, axis if len(axes) == 1 else None))
-    first_of_equals = 1 - DEPENDENT * np.arange(len(rows))
-    taken, _ = drivers_of(motions, np.array(rows), np.array(weights) * first_of_equals)
+    taken, _ = drivers_of(motions, np.array(rows), np.array(weights))
     path = _path(system, program, ranks, motions)
     moving = np.abs(motions).max(axis=0) > DEPENDENT
     still = {

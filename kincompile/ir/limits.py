@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], list[str]]:
     """Return a function of positions (N, n), times (N,) and parameters: sentences on limits left.
 
-    The value of a driver is its C. That of another joint is Phi of a driver with C = 0, which in
-    space is an angle within one turn.
+    The value of a driver is its C. That of another joint is Phi of a driver with C = 0, which of a
+    hinge is an angle but for whole turns, and in space an angle within one.
     """
     joints = {item.name: item for item in system.constraints if isinstance(item, Joint)}
     limits = [item for item in system.limits if item.joint in joints]
@@ -49,17 +49,22 @@ def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], lis
         (values,) = Phi(q, np.zeros_like(q), t, p)
         given, sentences = dict(zip(names, p.tolist(), strict=True)), []
         for k, (limit, unit) in enumerate(zip(limits, units, strict=True)):
-            ends = limit.ends(given, [], unit)
+            problems: list[str] = []
+            ends = limit.ends(given, problems, unit)
+            if problems:
+                sentences.append(f"The limit of {limit.joint} is no number with these parameters")
+                continue
             counted = values[:, k]
-            if type(measuring[k]).__name__ == within_a_turn and k >= len(own):
-                counted = _over_turns(counted, ends)
+            if unit == "rad" and k >= len(own):
+                is_within = type(measuring[k]).__name__ == within_a_turn
+                counted = _over_turns(np.unwrap(counted) if is_within else counted, ends)
             for sign, most in zip((-1.0, 1.0), ends, strict=True):
                 beyond = sign * (counted - most)
                 if beyond.max() > ZERO:  # less may be rounding errors
                     first, last = int(np.argmax(beyond > ZERO)), int(np.argmax(beyond))
+                    said = f"{most:.6g} {'rad' if unit == 'rad' else system.length_unit}".rstrip()
                     sentences.append(
-                        f"Joint {limit.joint} leaves its limit of {most:.6g} "
-                        f"{unit if unit == 'rad' else system.length_unit} at t = {t[first]:.10g}; "
+                        f"Joint {limit.joint} leaves its limit of {said} at t = {t[first]:.10g}; "
                         f"it is {counted[last]:.6g} at t = {t[last]:.10g}"
                     )
         return sentences
@@ -68,8 +73,11 @@ def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], lis
 
 
 def _over_turns(angles: Array, ends: Sequence[float]) -> Array:
-    """Return angles over turns; the first is within the limits, or nearest to their middle."""
+    """Return angles, less whole turns: the first is within the limits, or nearest to their middle.
+
+    Guesses of two bodies may be whole turns apart where the hinge is not.
+    """
     if ends[0] <= angles[0] <= ends[1]:
-        return np.unwrap(angles)
+        return angles
     middle = np.mean([end for end in ends if np.isfinite(end)] or [0.0])
-    return np.unwrap(np.concatenate(([middle], angles)))[1:]
+    return np.asarray(angles - 2 * np.pi * np.round((angles[0] - middle) / (2 * np.pi)))

@@ -43,8 +43,8 @@ class JointLimit:
         """Return least and greatest value with parameters; note what is no number."""
         where = f"limit of {self.joint!r}"
         return [
-            end
-            if isinstance(end, float) and math.isinf(end)
+            float(end)
+            if end in (-math.inf, math.inf)
             else checked_number(end, where, values, problems, unit)
             for end in (self.least, self.greatest)
         ]
@@ -59,7 +59,7 @@ def check_limits(
     limits: Sequence[JointLimit], names: Sequence[str], resolved: Sequence[Any], scope: Scope
 ) -> None:
     """Note what is wrong with limits of the constraints of these names."""
-    joints = {item.name: item for item in resolved if isinstance(item, Joint)}
+    known = {item.name: item for item in resolved}
     twice = [name for name, count in Counter(item.joint for item in limits).items() if count > 1]
     scope.problems += [f"limit of {name!r}: there are two; leave one out" for name in twice]
     for item in limits:
@@ -68,20 +68,23 @@ def check_limits(
             near = suggestion(item.joint, names) or f"; constraints are: {listed(names)}"
             scope.problems.append(f"{where}: there is no joint {shown(item.joint)}{near}")
             continue
-        if item.joint not in joints:
+        if item.joint not in known:
             continue  # what is wrong with it is said of itself
-        measuring = item.measuring(joints[item.joint])
+        joint = known[item.joint]
+        measuring = item.measuring(joint) if isinstance(joint, Joint) else None
         if measuring is None:
+            what = f"a {joint.type_name}" if isinstance(joint, Joint) else "a free equation"
             scope.problems.append(
-                f"{where}: a {joints[item.joint].type_name} has no value of its own; give limits "
-                "of hinges, sliders and drivers"
+                f"{where}: {what} has no value of its own; give limits of hinges, sliders and "
+                "drivers"
             )
             continue
-        if not joints[item.joint].has_value:
+        if not joint.has_value:
             resolve_joint(measuring, scope)
-        unit = value_of(measuring).unit
-        least, greatest = item.ends(scope.defaults, scope.problems, unit)
-        if not least < greatest:
+        unit, problems = value_of(measuring).unit, list[str]()
+        least, greatest = item.ends(scope.defaults, problems, unit)
+        scope.problems += problems
+        if not problems and not least < greatest:
             scope.problems.append(
                 f"{where}: it goes from {least:g} to {greatest:g}; give the least value first"
             )

@@ -248,7 +248,7 @@ class Mechanism(MatrixViews, TextViews):
             angle of a hinge counts. Without, they are the axes of the bodies that are farthest from
             the axis of the hinge.
         """
-        name = joint if isinstance(joint, str) else joint.name
+        name = str(getattr(joint, "name", joint))
         made = self.limit_type(name, least, greatest, **crosses)
         self.limits.append(made)
         return made

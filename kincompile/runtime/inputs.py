@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import operator
 import os
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import ModuleType
@@ -13,9 +14,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from kincompile.criteria import LONGEST_P
-from kincompile.errors import InputError
+from kincompile.errors import InputError, KincompileWarning
 from kincompile.names import column_name, listed, suggestion
-from kincompile.runtime.engine.code import Compiled, code_of, require_square
+from kincompile.runtime.engine.code import LIMITS, Compiled, code_of, require_square
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -70,6 +71,16 @@ class Inputs:
         if self.t.size > 1:
             raise InputError(f"{text}, got {self.t.size}: {remedy}.")
         return float(self.t[0])
+
+    def limits_left(self, q: NDArray[np.float64], level: int) -> str:
+        """Say which limits of joints positions (N, n) leave, and warn of it; "" of none."""
+        if LIMITS not in self.code.makers:
+            return ""
+        sentences = self.code.request(LIMITS)(q, self.t, self.p)
+        said = " ".join(f"{sentence}." for sentence in sentences)
+        if said:
+            warnings.warn(f"{self.code.name}: {said}", KincompileWarning, stacklevel=level)
+        return said
 
     def about(self) -> dict[str, Any]:
         """Return what a solution says of its mechanism, by field."""

@@ -26,12 +26,10 @@ from kincompile.errors import (
     BranchSwitchWarning,
     CornerWarning,
     InputError,
-    KincompileWarning,
     SingularConfigurationWarning,
     SolveError,
 )
 from kincompile.names import listed
-from kincompile.runtime.engine.code import LIMITS
 from kincompile.runtime.follow import follow
 from kincompile.runtime.inputs import read_inputs
 from kincompile.runtime.problem import problem
@@ -353,8 +351,7 @@ def solution_of(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
     warn(inputs, motion, outcome, 5)
     message, reasons = explained(inputs, motion, outcome)
     fields = motion.fields()
-    if beyond := _limits_left(inputs, fields["q"]):
-        warnings.warn(f"{inputs.code.name}: {beyond}", KincompileWarning, stacklevel=4)
+    beyond = inputs.limits_left(fields["q"], 5)
     return Solution(
         success=outcome.status is Status.CONVERGED,
         message=" ".join(filter(None, (message, motion.note, beyond))),
@@ -364,14 +361,6 @@ def solution_of(inputs: Inputs, motion: Motion, outcome: Outcome) -> Solution:
         **fields,
         **inputs.about(),
     )
-
-
-def _limits_left(inputs: Inputs, q: Array) -> str:
-    """Say which limits of joints a motion leaves."""
-    if LIMITS not in inputs.code.makers:
-        return ""
-    sentences = inputs.code.request(LIMITS)(q, inputs.t, inputs.p)
-    return " ".join(f"{sentence}." for sentence in sentences)
 
 
 def warn(inputs: Inputs, motion: Motion, outcome: Outcome, level: int) -> None:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection
 
     from kincompile.model.bodies import Body, Coordinate, Parameter
+    from kincompile.model.limits import JointLimit
     from kincompile.structure.remedies import MissingDriver, Surplus
 
 
@@ -110,6 +111,8 @@ class Findings:
         As in the system; the coordinates are the columns of Phi_q.
     constraints
         In the order of the rows of Phi_q.
+    limits
+        Limits of joints, as in the system.
     mobility
         Gruebler's count.
     pattern
@@ -157,6 +160,7 @@ class Findings:
     coordinates: tuple[Coordinate, ...]
     parameters: tuple[Parameter, ...]
     constraints: tuple[ConstraintEntry, ...]
+    limits: tuple[JointLimit, ...]
     mobility: Mobility
     pattern: tuple[tuple[int, int], ...]
     unmatched_equations: tuple[str, ...]

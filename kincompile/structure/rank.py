@@ -384,15 +384,21 @@ def drivers_of(motions: Array, rows: Array, weights: Array) -> tuple[list[int], 
     """Return rows to drive one after the other, each where it moves most; and the motions left.
 
     `motions` (dof, n) are directions in which a mechanism may move, `rows` (k, n) the rates that
-    drivers may give, `weights` (k,) how much rather one is taken.
+    drivers may give, `weights` (k,) how much rather one is taken. Of equals it is the first.
     """
+    weights = weights * (1 - DEPENDENT * np.arange(len(rows)))
     taken: list[int] = []
-    while len(motions) and len(rows):
-        rates = rows @ motions.T
+    rates = rows @ motions.T
+    while rates.size:
         lengths = np.linalg.norm(rates, axis=1)
         row = int(np.argmax(lengths * weights))
         if not lengths[row] > DEPENDENT:
             break
         taken.append(row)
-        motions = np.linalg.svd(rates[row : row + 1])[2][1:] @ motions
+        # Householder: the first of the reflected directions is that of this row.
+        normal = rates[row].copy()
+        normal[0] += math.copysign(lengths[row], normal[0])
+        normal *= math.sqrt(2) / np.linalg.norm(normal)
+        motions = (motions - np.outer(normal, normal @ motions))[1:]
+        rates = (rates - np.outer(rates @ normal, normal))[:, 1:]
     return taken, motions

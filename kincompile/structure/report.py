@@ -63,6 +63,7 @@ def inspect_system(
         coordinates=system.coordinates,
         parameters=system.parameters,
         constraints=tuple(map(_entry, system.constraints, system.row_offsets)),
+        limits=system.limits,
         mobility=gruebler(system),
         pattern=tuple(entries),
         unmatched_equations=tuple(equations),

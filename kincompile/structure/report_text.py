@@ -36,6 +36,7 @@ def report_text(found: Findings) -> str:
         "Other coordinates": _others(found),
         "Parameters": _parameters(found),
         "Constraints": _constraints(found),
+        "Limits": _limits(found),
         "Mobility": _mobility_lines(found),
         "Structure of Phi_q": list(_structure(found)),
         "What to do": list(_advice(found)),
@@ -92,6 +93,15 @@ def _constraints(found: Findings) -> list[str]:
         for item in found.constraints
     ]
     return table(("rows", "constraint", "type", "source", "between"), rows)
+
+
+def _limits(found: Findings) -> list[str]:
+    """Return limits as they are written; an end that is not limited is empty."""
+    rows = [
+        [item.joint, *("" if abs(x) == math.inf else str(x) for x in (item.least, item.greatest))]
+        for item in found.limits
+    ]
+    return table(("joint", "least", "greatest"), rows) if rows else []
 
 
 def _kind(item: ConstraintEntry) -> str:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -185,9 +186,11 @@ def _check(inputs: Inputs, rtol: Any, atol: Any, max_step: Any) -> None:
 def _solution(inputs: Inputs, found: Integration) -> Solution:
     """Return the motion, with its energies as columns."""
     code = inputs.code
-    names = ("t", "q", "q_dot", "q_ddot", "status", "residual", "message", "statistics", "events")
+    names = ("t", "q", "q_dot", "q_ddot", "status", "residual", "statistics", "events")
+    beyond = replace(inputs, t=found.t).limits_left(found.q, 4)
     solution = Solution(
         iterations=found.steps,
+        message=f"{found.message} {beyond}".rstrip(),
         success=bool((found.status == Status.CONVERGED).all()),
         **{name: getattr(found, name) for name in names},
         **inputs.about(),

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -117,7 +118,12 @@ WRONG = {
     ),
     "order": (("A", 2, 1), "limit of 'A': it goes from 2 to 1; give the least value first"),
     "degrees": (("guide", kc.deg, 3), "limit of 'guide': .*deg"),
-    "no number": (("A", kc.t, 3), "limit of 'A': t is not a number at the default parameters"),
+    "no number": (
+        ("A", kc.t, 3),
+        "^limit of 'A': t is not a number at the default parameters[^\n]*$",
+    ),
+    "no joint": ((3, 0, 1), "limit of '3': there is no joint '3'; constraints are: A, "),
+    "equation": (("free", 0, 1), "limit of 'free': a free equation has no value of its own;"),
 }
 
 
@@ -127,9 +133,57 @@ def test_a_limit_that_cannot_be_used(case):
     m = hinges() if case == "no value" else arm()
     if case == "no value":
         m.add(spatial.Spherical("ball", m.ground, (0, 0, 0), "door", (0, 0, 0)))
+    if case == "equation":
+        m.add(kc.Equation("free", m.bodies[0].phi - kc.t))
     m.limit(*given_)
     with pytest.raises(kc.ModelError, match=message):
         m.system()
+
+
+def test_that_bodies_of_a_hinge_may_have_guesses_that_are_turns_apart():
+    m = kc.Mechanism("turned", length_unit="")
+    a = m.body("a", (0.5, 0.8, 1 + 4 * np.pi))
+    m.add(kc.Revolute("A", m.ground, (0, 0), a, (-1, 0)))
+    m.add(kc.AbsoluteX("x", a, (0, 0), sympy.cos(1 + kc.t)))
+    m.limit("A", -1, 1.45)
+    m.limit("x", greatest=0.4)
+    assert said(m) == (
+        f"Joint x leaves its limit of 0.4 at t = 0; it is {np.cos(1):.6g} at t = 0. "
+        "Joint A leaves its limit of 1.45 rad at t = 0.5; it is 2 at t = 1."
+    )
+
+
+def test_a_limit_that_is_no_number_with_some_parameters():
+    m = arm()
+    most = m.parameter("most", 4.0)
+    m.limit("A", greatest=sympy.sqrt(most))
+    assert "limit" not in kc.solve(kc.compile(m), T).message
+    with pytest.warns(KincompileWarning):
+        message = kc.solve(kc.compile(m), T, {"most": -1.0}).message
+    assert message.endswith(" The limit of A is no number with these parameters.")
+
+
+def test_that_a_simulation_says_which_limits_it_leaves():
+    """By free fall: a slider without friction is at 5 t^2."""
+    m = kc.Mechanism("fall")
+    m.gravity = (10, 0)
+    s = m.body("s", mass=1, inertia=1)
+    m.add(kc.Translational("guide", m.ground, (0, 0), (1, 0), s, (0, 0), (1, 0)))
+    m.limit("guide", greatest=1.0)
+    with pytest.warns(KincompileWarning, match="leaves its limit of"):
+        message = kc.simulate(kc.compile(m), T).message
+    assert message.endswith(" Joint guide leaves its limit of 1 m at t = 0.5; it is 5 at t = 1.")
+
+
+def test_that_inspect_lists_limits_as_they_are_written():
+    m = arm()
+    m.limit("A", -30 * kc.deg, m.parameter("most", 0.5))
+    m.limit("guide", greatest=np.float64(0.7))
+    lines = kc.inspect(m).to_text().splitlines()
+    first = lines.index("Limits")
+    assert [line.split() for line in lines[first + 1 : first + 4]] == [
+        ["joint", "least", "greatest"], ["A", "-30*deg", "most"], ["guide", "0.7"],
+    ]  # fmt: skip
 
 
 ENDS = st.floats(-1e3, 1e3).map(lambda x: x + 0.0)

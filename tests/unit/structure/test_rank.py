@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kincompile.errors import InputError
-from kincompile.structure.rank import generic_rank
+from kincompile.structure.rank import drivers_of, generic_rank
 
 
 def report(equations, guess, *, drivers=(), angular=None, end=1.0):
@@ -121,3 +121,24 @@ def test_that_equations_that_never_have_values_together_are_named():
 
     with pytest.raises(InputError, match=r"no finite value near the guess: e\d"):
         report([root(1), root(-1)], (0.6, 0.7))
+
+
+def test_drivers_of_many_freedoms_take_the_first_of_equals_and_leave_nothing():
+    """Against least squares: each row taken is the one with most beside those before it."""
+    random = np.random.default_rng(3)
+    motions = np.linalg.qr(random.normal(size=(9, 4)))[0].T
+    rows = np.repeat(random.normal(size=(5, 9)), 2, axis=0)
+    taken, left = drivers_of(motions, rows, np.ones(10))
+    expected = []
+    for _ in range(4):
+        known = (rows[expected] @ motions.T).T
+        rates = (rows @ motions.T).T
+        rest = rates - known @ np.linalg.lstsq(known, rates, rcond=None)[0]
+        expected.append(int(np.argmax(np.round(np.linalg.norm(rest, axis=0), 9))))
+    assert taken == expected
+    assert all(row % 2 == 0 for row in taken)
+    assert left.shape == (0, 9)
+    assert drivers_of(motions, rows[:2], np.ones(2))[1].shape == (3, 9)
+    np.testing.assert_allclose(
+        drivers_of(motions, rows[:2], np.ones(2))[1] @ rows[0], 0, atol=1e-12
+    )
