@@ -127,16 +127,19 @@ def _part(
     (search.spread if plan.search == "sobol" else search.breed)(count, (plan.seed, number))
     every = np.concatenate((plan.bounds, np.reshape(bench.demands.time_bounds(), (-1, 2))))
     descent, budget, is_cut = Descent(bench, Variables(every)), plan.budget, False
-    drawn = _led(search, descent, count // LED, (plan.seed, number))
+
+    def is_late() -> bool:
+        return budget.seconds is not None and time.perf_counter() - begun > budget.seconds
+
+    drawn = _led(search, descent, 0 if is_late() else count // LED, (plan.seed, number))
     starts = search.found
 
     def is_over(step: int) -> bool:
         nonlocal is_cut
         if steps:
             steps(step)
-        late = budget.seconds is not None and time.perf_counter() - begun > budget.seconds
         most = None if budget.evaluations is None else budget.evaluations / plan.parts
-        is_cut = late or (most is not None and descent.motions >= most)
+        is_cut = is_late() or (most is not None and descent.motions >= most)
         return is_cut
 
     ends = Designs.none()
@@ -152,20 +155,27 @@ def _part(
 def _led(search: Search, descent: Descent, count: int, seed: tuple[int, int]) -> Array | None:
     """Try also what the first sets are led to; return what the model's own values are moved to.
 
-    None if those get through the times, empty if nothing near them does.
+    None if those get through the times, empty if nothing near them does. Where nothing was found
+    at all, more sets are led.
     """
     own = search.drawing()
     is_stuck = own is not None and np.isinf(search.first)
-    if not (count or is_stuck):
+    if not (count or is_stuck or search.is_empty):
         return None
-    together, to_u = Together(descent), search.variables.to_u
+    together, guesses, drawn = Together(descent), search.guesses, None
+
+    def errors_of(sets: Array) -> Array:
+        return search.scores(search.variables.to_u(sets))
+
     if count:
-        search.scores(to_u(together.led(search.sets(count, seed), search.guesses)))
-    if own is None or not is_stuck:
-        return None
-    near = together.led(np.repeat([own], len(search.guesses), axis=0), search.guesses)
-    errors = search.scores(to_u(near))
-    return near[errors.argmin()] if np.isfinite(errors).any() else own[:0]
+        errors_of(together.led(search.sets(count, seed), guesses))
+    if own is not None and is_stuck:
+        near = together.led(np.repeat([own], len(guesses), axis=0), guesses)
+        errors = errors_of(near)
+        drawn = near[errors.argmin()] if np.isfinite(errors).any() else own[:0]
+    if search.is_empty:
+        errors_of(together.led(search.sets(max(LED, 2 * count), seed), guesses))
+    return drawn
 
 
 def _together(parts: list[Explored]) -> Explored:

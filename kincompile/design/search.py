@@ -55,8 +55,8 @@ FEWEST, MOST_POINTS = 64, 2**18
 MOST_KEPT = 512
 """Starts that are kept, the best ones."""
 
-GENERATIONS = 40
-"""Of differential evolution."""
+GENERATIONS, FEWEST_BRED = 40, 5
+"""Of differential evolution, and the fewest sets that SciPy breeds from."""
 
 
 @dataclass(slots=True, eq=False)
@@ -83,6 +83,11 @@ class Search:
         between = np.linspace(kept[0], kept[-1], STEPS + 1)
         self._times = np.unique(np.concatenate([kept, between]))
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether no set gets through the times."""
+        return not self.found.error.size
+
     def spread(self, count: int, seed: Sequence[int]) -> None:
         """Try sets that are spread evenly over the bounds, and the defaults first."""
         self._tried(self._parts(count, seed))
@@ -107,7 +112,7 @@ class Search:
 
     def breed(self, count: int, seed: Sequence[int]) -> None:
         """Try sets that differential evolution breeds, starting with such a spread."""
-        parts = self._parts(count, seed)
+        parts = self._parts(max(count, FEWEST_BRED), seed)
 
         def score(columns: Array) -> Array:
             found = self._tried(np.clip(np.atleast_2d(columns.T), 0.0, 1.0))

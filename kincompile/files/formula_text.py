@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import ast
+import re
 import warnings
 from bisect import bisect_right
+from keyword import kwlist
+from typing import TYPE_CHECKING
 
 from kincompile.files.text_places import TextPlace, TextPlaces
 from kincompile.model.expressions import NotAnExpressionError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
 
 _LOOKALIKES = {
     "\u2212": "-", "\u2013": "-", "\u00b7": "*", "\u00d7": "*", "\u00f7": "/", "\u00b2": "^2",
@@ -16,6 +22,14 @@ _LOOKALIKES = {
 _PUNCTUATION = frozenset("_.,+-*/^()[]<>= \t\r\n")
 EXPECTED = "numbers, names, + - * / ^ ( ) and functions"
 """What may stand in a formula, for messages."""
+
+GRAMMAR = frozenset({"and", "or", "True"})
+"""Words that formulas have themselves, in conditions."""
+
+_KEPT = {x: x[:-2] + chr(0x430 + k) for k, x in enumerate(kwlist) if x not in GRAMMAR}
+"""Other words that Python keeps, each as a name of as many bytes that no formula has."""
+
+_WORDS = {kept: word for word, kept in _KEPT.items()}
 
 
 class ExpressionError(NotAnExpressionError):
@@ -39,7 +53,7 @@ class ExpressionError(NotAnExpressionError):
 class Source:
     """The text as written, as Python reads it, and the way from one to the other."""
 
-    def __init__(self, text: str, place: TextPlace) -> None:
+    def __init__(self, text: str, place: TextPlace, names: Collection[str] = ()) -> None:
         self.text = text
         self._place = place
         # One line between brackets: line breaks mean nothing inside a formula. `^` is Python's
@@ -47,7 +61,15 @@ class Source:
         self._python = "(" + "".join(" " if ch.isspace() else ch for ch in text) + ")"
         self._carets = [k + 1 for k, ch in enumerate(text) if ch == "^"]
         self._python = self._python.replace("^", "**")
+        if kept := [word for word in _KEPT if word in names]:
+            words = rf"\b({'|'.join(kept)})\b"
+            self._python = re.sub(words, lambda found: _KEPT[found[0]], self._python)
         self._moved = [k + number for number, k in enumerate(self._carets)]
+
+    @staticmethod
+    def name(node: ast.Name) -> str:
+        """Return a name as it is written."""
+        return _WORDS.get(node.id, node.id)
 
     def tree(self) -> ast.expr:
         """Return the syntax tree of the text."""

@@ -107,7 +107,7 @@ def parse_expression(
         If the text holds anything but numbers, declared names, arithmetic and the functions of
         `FUNCTIONS`, or is longer or deeper than the limits of this module.
     """
-    source = Source(text, place or TextPlace())
+    source = Source(text, place or TextPlace(), names)
     if len(text) > MAX_LENGTH:
         raise source.error(
             f"the expression has {len(text)} characters; at most {MAX_LENGTH} are read", 0
@@ -201,18 +201,12 @@ class _Reader:
     def _expand(self, value: sympy.Expr, node: ast.Name, depth: int) -> None:
         """Count what a name stands for, which may hold names itself and double with each."""
         parts, levels = extent(value)
+        what = f"with {self._source.name(node)} written out, the expression"
         self._expanded += parts
         if self._expanded > MAX_EXPANDED:
-            raise self._error(
-                f"with {node.id} written out, the expression has more than {MAX_EXPANDED:,} parts",
-                node,
-            )
+            raise self._error(f"{what} has more than {MAX_EXPANDED:,} parts", node)
         if depth + levels > MAX_EXPANDED_DEPTH:
-            raise self._error(
-                f"with {node.id} written out, the expression is nested more than "
-                f"{MAX_EXPANDED_DEPTH} levels deep",
-                node,
-            )
+            raise self._error(f"{what} is nested more than {MAX_EXPANDED_DEPTH} levels deep", node)
 
     def _number(self, node: ast.Constant) -> sympy.Expr:
         value = node.value
@@ -223,7 +217,7 @@ class _Reader:
         return sympy.Integer(value) if isinstance(value, int) else sympy.Float(value)
 
     def _name(self, node: ast.Name, depth: int) -> sympy.Expr:
-        name = node.id
+        name = self._source.name(node)
         if name in self._names:
             self._expand(self._names[name], node, depth)
             return self._names[name]
@@ -332,7 +326,7 @@ class _Reader:
     def _call(self, node: ast.Call, depth: int) -> sympy.Expr:
         if not isinstance(node.func, ast.Name):
             raise self._error("a bracket after a value calls nothing; write * for a product", node)
-        name = node.func.id
+        name = self._source.name(node.func)
         if name == "Piecewise":
             return self._piecewise(node, depth)
         if name not in FUNCTIONS:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import keyword
 import logging
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy
 
+from kincompile.files.formula_text import GRAMMAR
 from kincompile.files.robots.robot import beside, legal_names
 from kincompile.model.equation import Equation
 from kincompile.names import COLUMNS, RESERVED, listed, shown
@@ -82,7 +82,7 @@ class _Builder:
         return {
             *RESERVED,
             *COLUMNS,
-            *keyword.kwlist,
+            *GRAMMAR,
             *(f"{x}_{name}" for name in self._names.values() for x in letters),
         }
 

@@ -263,6 +263,17 @@ def test_that_a_drawing_is_moved_where_there_are_no_points_to_reach():
     assert kc.solve(module, t, found.drawn).success
 
 
+@pytest.mark.filterwarnings("ignore::kincompile.errors.KincompileWarning")
+def test_that_more_sets_are_led_where_none_gets_through():
+    m = four_bar("drawn", r3=1.0, r4=1.0)
+    bounds = {"r1": (1.0, 6.0), "r2": (0.5, 2.0), "r3": (1.0, 6.0), "r4": (1.0, 6.0)}
+    target = kc.targets.path("P", [(2.0, 3.0), (1.0, 3.6), (0.0, 3.7)])
+    found = kc.fit(m, target, bounds=bounds, samples=1, starts=2)
+    assert found.success
+    assert found.drawn == {}
+    assert found.counts.sampled == 1
+
+
 def test_that_a_drawing_near_which_nothing_is_assembled_is_refused():
     """Its crank can be no shorter."""
     with pytest.raises(kc.errors.InputError, match="does not move through the times"):
@@ -350,11 +361,19 @@ def test_a_budget_of_motions_ends_the_search_and_says_so():
 
 
 def test_a_budget_of_seconds_ends_the_search(monkeypatch):
-    """By a clock that a second passes on whenever it is looked at."""
-    clock = itertools.count()
+    """By a clock that two seconds pass on whenever it is looked at."""
+    clock = itertools.count(step=2)
     monkeypatch.setattr("kincompile.design.explore.time.perf_counter", lambda: float(next(clock)))
     assert straight(seconds=5).counts.is_cut
     assert not straight(seconds=10**6).counts.is_cut
+    monkeypatch.setattr(Together, "led", None)  # for which no time is left
+    assert straight(seconds=1).counts.is_cut
+
+
+def test_that_evolution_begins_with_as_many_sets_as_it_needs(monkeypatch):
+    monkeypatch.setattr("kincompile.design.search.GENERATIONS", 1)
+    found = straight(samples=1, starts=2, search="differential evolution")
+    assert found.counts.sampled >= 5
 
 
 def test_progress_rises_to_the_end():

@@ -115,11 +115,11 @@ def test_that_bodies_and_joints_without_names_may_stand_on_one_line(tmp_path: Pa
     assert {"body_1", "body_1_2"} <= {*m.links}
 
 
-def test_that_names_that_python_keeps_are_changed(tmp_path: Path) -> None:
+def test_that_names_that_formulas_keep_are_changed(tmp_path: Path) -> None:
     """A model file reads no formula with such a name."""
-    m = model(tmp_path, GOOD.replace('"first"', '"import"').replace('"second"', '"lambda"'))
+    m = model(tmp_path, GOOD.replace('"first"', '"or"').replace('"second"', '"lambda"'))
     (written := tmp_path / "robot.toml").write_text(m.to_toml())
-    assert [x.name for x in kc.read(written).parameters] == ["import_2", "lambda_2"]
+    assert [x.name for x in kc.read(written).parameters] == ["or_2", "lambda"]
 
 
 def test_that_shapes_which_are_no_solids_or_too_many_are_left_out(

@@ -2,6 +2,7 @@
 
 import random
 from contextlib import suppress
+from keyword import kwlist
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kincompile.files.formula_text import ExpressionError
+from kincompile.files.formula_text import GRAMMAR, ExpressionError
 from kincompile.files.safe_expressions import (
     FUNCTIONS,
     MAX_DEPTH,
@@ -29,6 +30,19 @@ NAMES = {"x": x, "y": y, "phi3": phi3, "w": 2 * y, "step": sympy.Piecewise((x, y
 def nested(levels):
     """Return Piecewise of so many levels, each in the condition of the next."""
     return "Piecewise((1, x < " * levels + "3" + "), (2, True))" * levels
+
+
+def test_that_names_which_python_keeps_are_read_where_they_are_declared() -> None:
+    names = {word: sympy.Symbol(f"_{word}") for word in kwlist if word not in GRAMMAR}
+    for word, value in names.items():
+        read = parse_expression(f"2^{word} - {word}^2*y", {**NAMES, **names})
+        assert read == 2**value - value**2 * y
+    with pytest.raises(ExpressionError, match=r"column 22: there is no 'z'; .* lambda, "):
+        parse_expression("lambda^2*lambda^2 + (z)", {**NAMES, **names})
+    with pytest.raises(ExpressionError, match="'lambda' is not a function; write "):
+        parse_expression("lambda(2)", names)
+    with pytest.raises(ExpressionError, match="column 8: found '2'"):
+        parse_expression("lambda^2", NAMES)
 
 
 @pytest.mark.parametrize(

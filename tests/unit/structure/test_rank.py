@@ -129,7 +129,7 @@ def test_drivers_of_many_freedoms_take_the_first_of_equals_and_leave_nothing():
     motions = np.linalg.qr(random.normal(size=(9, 4)))[0].T
     rows = np.repeat(random.normal(size=(5, 9)), 2, axis=0)
     taken, left = drivers_of(motions, rows, np.ones(10))
-    expected = []
+    expected: list[int] = []
     for _ in range(4):
         known = (rows[expected] @ motions.T).T
         rates = (rows @ motions.T).T
