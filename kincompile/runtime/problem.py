@@ -132,6 +132,17 @@ class Attempt:
         """The last position; None where there is none."""
         return self.last if self.points else None
 
+    @property
+    def away(self) -> Array:
+        """How far each position reached is from the guess (k, n), in parts of what is near."""
+        q = np.array([point.q for point in self.points])
+        return np.asarray(np.abs(q - q[0]) / self.equations.near)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether it converges no faster than towards a double root."""
+        return converges_linearly(self.corrections)
+
 
 if TYPE_CHECKING:
     Step: TypeAlias = Callable[[Problem, float, Point], tuple[Point, float] | Status]
@@ -165,7 +176,7 @@ def iterate(
             attempt.status = Status.CONVERGED
             break
     else:
-        if converges_linearly(attempt.corrections) and equations.holds(
+        if attempt.is_linear and equations.holds(
             attempt.last, criteria.RESIDUAL_FACTOR * tolerance
         ):
             attempt.status = Status.SINGULAR
@@ -205,6 +216,13 @@ def shortest_step(
     change *= equations.reference / max(1.0, float(np.abs(change).max(initial=0.0)))
     following = equations.at(point.q - change, t)
     return Status.NOT_FINITE if following is None else (following, norm(change))
+
+
+def near_step(equations: Problem, t: float, point: Point) -> tuple[Point, float] | Status:
+    """Apply the whole correction, unless it leads too far to settle near a guess."""
+    outcome = plain_step(equations, t, point)
+    is_far = not isinstance(outcome, Status) and outcome[1] > norm(equations.near)
+    return Status.NOT_CONVERGED if is_far else outcome
 
 
 def safeguarded_step(equations: Problem, t: float, point: Point) -> tuple[Point, float] | Status:

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kincompile import criteria
 from kincompile.runtime.engine.linear import LARGEST_CAREFUL, Dense, Floats, Planned, stacked
-from kincompile.runtime.engine.scales import converges_linearly, norm
 from kincompile.runtime.march import March, Outcome
-from kincompile.runtime.problem import Attempt, iterate, plain_step, safeguarded_step
+from kincompile.runtime.problem import Attempt, iterate, near_step, safeguarded_step
 from kincompile.runtime.status import Status
 
 if TYPE_CHECKING:
@@ -38,9 +36,8 @@ def start(march: March, t: float, inputs: Inputs, *, is_in_vain: bool = False) -
     limits, equations = (inputs.tolerance, inputs.max_iterations), march.equations
     if equations.code.lanes is not None and not equations.code.redundant:
         floats = march.with_engine(Floats(equations.code, equations.p))
-        near = partial(_near_step, most=norm(equations.near))
-        attempt = iterate(floats.equations, t, inputs.guess, *limits, near)
-        if attempt.status is Status.CONVERGED and is_settled(floats.equations, attempt.points):
+        attempt = iterate(floats.equations, t, inputs.guess, *limits, near_step)
+        if attempt.status is Status.CONVERGED and is_settled(attempt):
             outcome = _started(floats, attempt, *attempt.points[:: len(attempt.points) - 1])
             point = equations.at(attempt.last.q, t)
             if outcome.state is not None and point is not None:
@@ -57,22 +54,13 @@ def start(march: March, t: float, inputs: Inputs, *, is_in_vain: bool = False) -
     return _started(march, attempt, guess, point)
 
 
-def _near_step(
-    equations: Problem, t: float, point: Point, most: float
-) -> tuple[Point, float] | Status:
-    """Apply the whole correction, unless it leads too far to settle near a guess."""
-    outcome = plain_step(equations, t, point)
-    is_far = not isinstance(outcome, Status) and outcome[1] > most
-    return Status.NOT_CONVERGED if is_far else outcome
-
-
 def _started(march: March, attempt: Attempt, guess: Point, point: Point) -> Outcome:
     """Return the position that an attempt found from a guess as the start of a motion."""
     folded = is_folded(march.equations, guess, point)
     left = not folded and _is_on_another(march.equations, guess, point)
     state = march.state(point)
     # Towards a singular position Newton's method creeps, and ends a rounding error before it.
-    if not isinstance(state, Status) and converges_linearly(attempt.corrections):
+    if not isinstance(state, Status) and attempt.is_linear:
         state = Status.SINGULAR if state.sensitivity > criteria.TOO_NEAR else state
     found = state if isinstance(state, Status) else Status.CONVERGED
     return Outcome(
@@ -123,7 +111,7 @@ def assemble(
         equations = _careful(equations)
     plain = iterate(equations, t, guess, *limits)
     found = plain.status is Status.CONVERGED
-    if not plain.points or (found and is_settled(equations, plain.points)):
+    if not plain.points or (found and is_settled(plain)):
         return plain
     turned = turned_guess(equations, plain.points)
     if turned is not None:
@@ -136,7 +124,7 @@ def assemble(
     if is_in_vain and not found:
         plain.status = Status.NOT_CONVERGED
         return plain
-    is_sound = found and not is_thrown(equations, plain.points)
+    is_sound = found and not is_thrown(plain)
     good = [plain] if found else []
     if not is_sound or left_branch(equations, plain.points[0], plain.last):
         attempts = []
@@ -153,7 +141,7 @@ def assemble(
     if equations.away(opposite, guess) <= criteria.MIRRORED * max(1.0, away):
         beyond = iterate(equations, t, opposite, *limits)
         most = min(criteria.AS_NEAR * max(1.0, away), criteria.MIRRORED)
-        is_sound = bool(beyond.points) and not is_thrown(equations, beyond.points)
+        is_sound = bool(beyond.points) and not is_thrown(beyond)
         if is_sound and equations.away(beyond.last.q, guess) <= most:
             good = _ordered(equations, plain.points[0], [*good, beyond], tolerance)
     if equations.is_turned(good[0].last.q, guess):
@@ -282,20 +270,18 @@ def is_folded(equations: Problem, guess: Point, found: Point) -> bool:
     return bool((np.abs(here) <= criteria.FOLDED * np.abs(there)).any())
 
 
-def is_settled(equations: Problem, way: Sequence[Point]) -> bool:
-    """Say whether the iterates stayed near enough to the guess to skip searching for another one.
+def is_settled(attempt: Attempt) -> bool:
+    """Say whether an attempt ended near enough to its guess to skip searching for another one.
 
     In compiled code it must not have gone far: where it ends then, rounding would decide.
     """
-    away = np.abs(np.array([point.q for point in way]) - way[0].q) / equations.near
-    is_near = bool((away[-1] <= criteria.SETTLED).all())
-    return is_near and (_is_careful(equations) or bool((away <= criteria.THROWN).all()))
+    is_near = bool((attempt.away[-1] <= criteria.SETTLED).all())
+    return is_near and (_is_careful(attempt.equations) or not is_thrown(attempt))
 
 
-def is_thrown(equations: Problem, way: Sequence[Point]) -> bool:
-    """Say whether a way went so far that rounding errors decide where it ends."""
-    iterates = np.array([point.q for point in way])
-    return not bool((np.abs(iterates - iterates[0]) / equations.near <= criteria.THROWN).all())
+def is_thrown(attempt: Attempt) -> bool:
+    """Say whether an attempt went so far that rounding errors decide where it ends."""
+    return not bool((attempt.away <= criteria.THROWN).all())
 
 
 def turned_guess(equations: Problem, way: Sequence[Point]) -> Array | None:

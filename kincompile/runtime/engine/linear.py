@@ -314,7 +314,7 @@ class Floats(Linear):
             floats = [x.tolist() if isinstance(x, np.ndarray) else x for x in given]
             return function(own.floats, *floats)
         except (ArithmeticError, ValueError):
-            return function(own.arrays, *given)
+            return function(own.arrays, *map(np.asarray, given))
 
     def _at(self, function: Callable[..., Any], t: float, *states: Array) -> Array:
         """Return what code of the mechanism gives at a point."""

@@ -10,9 +10,9 @@ import kincompile as kc
 
 PACKAGE = str(Path(kc.__file__).parent)
 
-RETURNS = 26
+RETURNS = 27
 """How often control may come back to a file that it has been in, by a call or a return: each way
-from one file to another counts once. That is measured. Eleven files need ten, from each back
+from one file to another counts once. That is measured. Twelve files need eleven, from each back
 to its caller; the others are files that several ask, such as scales and linear systems."""
 
 
@@ -45,6 +45,6 @@ def test_few_files_are_returned_to_on_the_way_through_a_grid(example_named):
     finally:
         sys.setprofile(before)
     stays = [there for _, there in moves]
-    assert len(set(stays)) > 10
+    assert len(set(stays)) > 11
     walk = " > ".join(Path(file).stem for file in stays)
     assert len(stays) - len(set(stays)) <= RETURNS, walk
