@@ -155,7 +155,7 @@ class Compiled:
 
     def has(self, kind: Kind[Any]) -> bool:
         """Say whether a request is, or was, for something that there is."""
-        return kind in self.makers or any(kind == made for made, _ in self.made)
+        return kind in self.makers or any(kind == made for made, _ in tuple(self.made))
 
     def _maker(self, kind: Kind[Any]) -> Callable[..., Any]:
         if kind in self.makers:

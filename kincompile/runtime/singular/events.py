@@ -186,7 +186,8 @@ def singular_start(equations: Problem, point: Point, t: float) -> Event | None:
     missing = basis[:, sizes <= IN_RANGE * sizes[0]].T @ (weights * nu)
     demanded = float(np.linalg.norm(missing)) > IN_RANGE * float(np.linalg.norm(weights * nu))
     kind = LOCK_UP if demanded else BIFURCATION
-    return _event(equations, kind, point.q, t, point.Phi_q)
+    # The module keeps the position; the event's is the user's.
+    return _event(equations, kind, point.q.copy(), t, point.Phi_q)
 
 
 def status_after(event: Event, outcome: Outcome, t: float) -> Status:

@@ -4,10 +4,11 @@ import warnings
 
 import numpy as np
 import pytest
+import sympy
 
 import kincompile as kc
 from kincompile.errors import AssemblyWarning, SolveError
-from kincompile.runtime.engine.code import code_of
+from kincompile.runtime.engine.code import Kind, code_of
 from kincompile.runtime.results.solution import Solution
 from kincompile.runtime.solve import solve
 from kincompile.runtime.status import Status
@@ -245,6 +246,30 @@ def test_the_start_that_a_module_keeps_is_of_what_it_depends_on(four_bar):
             for name in ("q", "q_dot", "q_ddot", "status", "residual", "iterations"):
                 np.testing.assert_array_equal(getattr(found, name), getattr(fresh, name))
             found.q[:] = 7.0  # it is the caller's
+
+
+def test_the_event_of_a_singular_start_is_the_callers():
+    x = sympy.Symbol("x")
+    module = kc.compile(kc.ConstraintSystem("meet", ["x"], [x**2 - kc.t**2], guess={"x": 0}))
+    for _ in range(2):
+        found = solve(module, [0.0, 0.1])
+        assert (found.status[0], found.q[0, 0], found.events[0].q[0]) == (Status.SINGULAR, 0, 0)
+        found.events[0].q[:] = 7.0
+
+
+def test_another_thread_may_keep_a_start_while_a_module_is_asked_what_it_has(four_bar):
+    code = code_of(four_bar)
+
+    class Asked(Kind[object]):
+        __hash__ = object.__hash__
+
+        def __eq__(self, other: object) -> bool:
+            code.made[Kind("late"), None] = None
+            return False
+
+    code.made[Kind("early"), None] = None
+    assert not code.has(Asked("asked"))
+    code.made.clear()
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, math.pi / 2, 2.0, math.pi, 5.0])
