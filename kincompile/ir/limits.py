@@ -38,6 +38,7 @@ def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], lis
     program = lower(system.rewritten(own, measuring[len(own) :]))
     Phi = interpreter(program, ("Phi",))
     within_a_turn = system.ground.kind.turning[1]
+    lengths = [item.unit == system.length_unit for item in system.coordinates]
     names = [item.name for item in system.parameters]
     units = [value_of(item).unit for item in measuring]
 
@@ -46,6 +47,7 @@ def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], lis
         if not found.any():
             return []
         q, t = q[found], t[found]
+        far = float(np.abs(q[:, lengths]).max(initial=0.0)) or 1.0
         (values,) = Phi(q, np.zeros_like(q), t, p)
         given, sentences = dict(zip(names, p.tolist(), strict=True)), []
         for k, (limit, unit) in enumerate(zip(limits, units, strict=True)):
@@ -58,8 +60,9 @@ def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], lis
             if unit == "rad" and k >= len(own):
                 is_within = type(measuring[k]).__name__ == within_a_turn
                 counted = _over_turns(np.unwrap(counted) if is_within else counted, ends)
+            whole = max(float(np.abs(counted).max()), far) if unit != "rad" else 1.0
             for sign, most in zip((-1.0, 1.0), ends, strict=True):
-                beyond = sign * (counted - most)
+                beyond = sign * (counted - most) / whole
                 if beyond.max() > ZERO:  # less may be rounding errors
                     first, last = int(np.argmax(beyond > ZERO)), int(np.argmax(beyond))
                     said = f"{most:.6g} {'rad' if unit == 'rad' else system.length_unit}".rstrip()

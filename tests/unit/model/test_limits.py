@@ -153,6 +153,15 @@ def test_that_bodies_of_a_hinge_may_have_guesses_that_are_turns_apart():
     )
 
 
+def test_that_the_unit_of_length_changes_nothing():
+    m = kc.Mechanism("small")
+    s = m.body("s", (2e-9, 0, 0))
+    m.add(kc.Translational("guide", m.ground, (0, 0), (1, 0), s, (0, 0), (1, 0)))
+    m.add(kc.AbsoluteX("x", s, (0, 0), 1e-9 * (1 + kc.t)))
+    m.limit("guide", 1e-9 * (1 + 1e-15), 1.45e-9)
+    assert said(m) == "Joint guide leaves its limit of 1.45e-09 m at t = 0.5; it is 2e-09 at t = 1."
+
+
 def test_a_limit_that_is_no_number_with_some_parameters():
     m = arm()
     most = m.parameter("most", 4.0)
