@@ -164,17 +164,17 @@ def _led(search: Search, descent: Descent, count: int, seed: tuple[int, int]) ->
         return None
     together, guesses, drawn = Together(descent), search.guesses, None
 
-    def errors_of(sets: Array) -> Array:
-        return search.scores(search.variables.to_u(sets))
+    def tried(sets: Array) -> tuple[Array, Array]:
+        found, q = together.led(sets, guesses)
+        return found, search.scores(search.variables.to_u(found), q)
 
     if count:
-        errors_of(together.led(search.sets(count, seed), guesses))
+        tried(search.sets(count, seed))
     if own is not None and is_stuck:
-        near = together.led(np.repeat([own], len(guesses), axis=0), guesses)
-        errors = errors_of(near)
+        near, errors = tried(np.repeat([own], len(guesses), axis=0))
         drawn = near[errors.argmin()] if np.isfinite(errors).any() else own[:0]
     if search.is_empty:
-        errors_of(together.led(search.sets(max(LED, 2 * count), seed), guesses))
+        tried(search.sets(max(LED, 2 * count), seed))
     return drawn
 
 

@@ -132,20 +132,23 @@ class Search:
         self.tried += len(parts)
         return found
 
-    def scores(self, parts: Array) -> Array:
-        """Return the least error of each set over its assemblies, infinite where it has none."""
+    def scores(self, parts: Array, own: Array | None = None) -> Array:
+        """Return the least error of each set over its assemblies, infinite where it has none.
+
+        Each may also have a guess of its own, (B, n).
+        """
         values = self.variables.to_x(parts)
         found = np.full(len(values), np.inf)
         count = min(MOST_AT_ONCE, max(FEWEST, MOST_POINTS // self._times.size))
         for first in range(0, len(values), count):
             some = values[first : first + count]
-            for guess in self.guesses:
-                own = self._scored(some, guess)
-                found[first : first + len(some)] = np.minimum(found[first : first + len(some)], own)
+            places = slice(first, first + len(some))
+            for guess in (*self.guesses, *([] if own is None else [own[places]])):
+                found[places] = np.minimum(found[places], self._scored(some, guess))
         return found
 
     def _scored(self, values: Array, guess: Array) -> Array:
-        """Return the errors of sets that are assembled from a guess, and remember the best."""
+        """Return the errors of sets that are assembled from a guess, or (B, n); keep the best."""
         sets = self.bench.sets(values)
         alive, motion = self._through(sets, guess)
         self.moved += alive.size
@@ -211,14 +214,14 @@ class Search:
         alive = np.arange(len(sets))
         history: list[Array] = []
         with np.errstate(all="ignore"):
-            equations = problem(code, sets[0], guess, times[0])
+            equations = problem(code, sets[0], self.guesses[0], times[0])
 
             def march() -> March:
                 lanes = np.ascontiguousarray(sets[alive].T)
                 return March(equations, Planned(code, lanes), TOLERANCE)
 
             on_way = march()
-            q = np.repeat(guess[:, np.newaxis], len(sets), axis=1)
+            q = np.broadcast_to(guess, (len(sets), guess.shape[-1])).T.copy()
             found = on_way.correct_together(q, times[0], MAX_ITERATIONS)
             state, checks = on_way.complete(found.point)
             good = all_hold(found.good, checks)
@@ -242,8 +245,9 @@ class Search:
         """Return the same of redundant equations.
 
         Those that are solved may be singular where all together are not, so that the careful march
-        has to help.
+        has to help. It begins all sets from one guess.
         """
+        guess = guess if guess.ndim == 1 else self.guesses[0]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", KincompileWarning)
             found = solve(self.bench.module, self._times, sets[:, np.newaxis], guess)

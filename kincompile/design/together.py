@@ -66,9 +66,10 @@ class Together:
         times = descent.times(np.eye(size + 1)[self._count :, :size])
         self._times_by = (times[:-1] - times[-1]).T
 
-    def led(self, values: Array, guesses: Array) -> Array:
+    def led(self, values: Array, guesses: Array) -> tuple[Array, Array]:
         """Return parameters (2 B, k) that sets are led to, of as many as there is time for.
 
+        With them come positions (2 B, n) at the first time, from which they can be assembled.
         Each begins with one of the guesses (g, n) in turn. What can only just be assembled is
         singular: there are also parameters a little further on.
         """
@@ -78,12 +79,13 @@ class Together:
         x = np.concatenate((values, times), axis=1)
         with np.errstate(all="ignore"):
             q = self._pulled(x, guesses[np.arange(len(x)) % len(guesses)])
-            found = self._followed(x, q)
+            found, q = self._followed(x, q)
         variables = self._variables
         begun, u = variables.to_u(x), variables.to_u(found)
         change = np.where(variables.is_turn, (u - begun + 0.5) % 1.0 - 0.5, u - begun)
         further = variables.to_x(variables.within(u + FURTHER * change))
-        return np.concatenate((found, further))[:, : self._count]
+        first = q[:, self._descent.times(x)[0].argmin()]
+        return np.concatenate((found, further))[:, : self._count], np.concatenate((first, first))
 
     def _even_times(self) -> Array:
         """Return variables that are times, evenly spread, (nt,)."""
@@ -115,8 +117,8 @@ class Together:
             found[:, place] = q[:, 0]
         return found
 
-    def _followed(self, x: Array, q: Array) -> Array:
-        """Return variables that steps in them and in all positions lead to."""
+    def _followed(self, x: Array, q: Array) -> tuple[Array, Array]:
+        """Return variables, and positions, that steps in both lead to."""
         variables, m = self._variables, len(self._code.equations)
         u = variables.to_u(x)
         for weight in np.geomspace(*STIFFNESS, STEPS).tolist():
@@ -132,7 +134,7 @@ class Together:
             part = np.where(np.isfinite(part), self._shortening(change, part), 0.0)
             u = variables.within(u + part[:, np.newaxis] * np.nan_to_num(du))
             q = q + part[:, np.newaxis, np.newaxis] * scale[..., 0, :] * np.nan_to_num(change)
-        return variables.to_x(u)
+        return variables.to_x(u), q
 
     def _shortening(self, change: Array, part: Any = 1.0) -> Array:
         """Return which part of a change of positions (B, N, n), in scales, is taken."""

@@ -12,6 +12,7 @@ import sympy
 from scipy import optimize
 
 import kincompile as kc
+from kincompile import spatial
 from kincompile.design.demands import read_demands
 from kincompile.design.descent import Descent
 from kincompile.design.placing import Placing, best_places
@@ -261,6 +262,25 @@ def test_that_a_drawing_is_moved_where_there_are_no_points_to_reach():
     module = kc.compile(m)
     assert not kc.solve(module, t).success
     assert kc.solve(module, t, found.drawn).success
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::kincompile.errors.KincompileWarning")
+def test_a_drawing_in_space_whose_guess_is_singular_and_cannot_be_assembled():
+    """A crank about z, a rod too short, a rocker about x: the rod lies across the rocker's way."""
+    m, o, x, z = spatial.Mechanism("short"), (0, 0, 0), (1, 0, 0), (0, 0, 1)
+    a, b, c, d = (m.parameter(*item) for item in (("a", 1), ("b", 1), ("c", 2), ("d", 2.5)))
+    crank, rocker = m.body("crank"), m.body("rocker", (2.5, 0, 0))
+    m.add(spatial.Revolute("A", m.ground, o, z, crank, o, z))
+    m.add(spatial.RelativeRotation("motor", m.ground, z, x, crank, z, x, 0.8 + 0.3 * kc.t))
+    m.add(spatial.Revolute("D", m.ground, (d, 0, 0), x, rocker, o, x))
+    m.add(spatial.Distance("rod", crank, (a, 0, 0), rocker, (0, 0, c), b))
+    m.point("P", rocker, (0, 0, c))
+    wanted = kc.targets.value("P.z", [2.0, 1.976, 1.915, 1.845], [0.1, 0.5, 0.9, 1.2], within=1e-3)
+    bounds = {"a": (0.5, 2), "b": (0.9, 6), "c": (1, 3), "d": (1, 4)}
+    found = kc.fit(m, wanted, bounds=bounds, samples=1, starts=4)
+    assert found.drawn
+    assert found.success
 
 
 @pytest.mark.filterwarnings("ignore::kincompile.errors.KincompileWarning")
