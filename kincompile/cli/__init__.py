@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 import click
 
 import kincompile as kc
-from kincompile.cli.shared import INTERRUPTED, USAGE_OR_MODEL, on_screen
+from kincompile.cli.shared import INTERRUPTED, USAGE_OR_MODEL, on_screen, shown_angles
 from kincompile.errors import InternalError, KincompileError
 from kincompile.names import escaped_lines
 
@@ -83,7 +83,10 @@ def _end(message: str, code: int) -> NoReturn:
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Write a warning to stderr as a message, without the line of code that gave it."""
-    click.echo(on_screen(escaped_lines(f"Warning: {message}")), err=True)
+    context = click.get_current_context(silent=True)
+    unit = context.params.get("angle_unit", "rad") if context else "rad"
+    said = shown_angles(f"Warning: {message}", unit)
+    click.echo(on_screen(escaped_lines(said)), err=True)
 
 
 @click.group(

@@ -65,10 +65,13 @@ def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], lis
                 beyond = sign * (counted - most) / whole
                 if beyond.max() > ZERO:  # less may be rounding errors
                     first, last = int(np.argmax(beyond > ZERO)), int(np.argmax(beyond))
-                    said = f"{most:.6g} {'rad' if unit == 'rad' else system.length_unit}".rstrip()
+                    own_unit = "rad" if unit == "rad" else system.length_unit
+                    limits_end, reached = (
+                        f"{value:.6g} {own_unit}".rstrip() for value in (most, counted[last])
+                    )
                     sentences.append(
-                        f"Joint {limit.joint} leaves its limit of {said} at t = {t[first]:.10g}; "
-                        f"it is {counted[last]:.6g} at t = {t[last]:.10g}"
+                        f"Joint {limit.joint} leaves its limit of {limits_end} at "
+                        f"t = {t[first]:.10g}; it is {reached} at t = {t[last]:.10g}"
                     )
         return sentences
 

@@ -344,3 +344,24 @@ def test_that_no_zero_has_a_sign(kincompile, tmp_path):
     assert np.signbit(zeros).any()
     assert "-0.0" not in re.split(r"[,\n]", out.read_text())
     assert [float(row["phi_rocker"]) for row in rows_of(out)] == solution["phi_rocker"].tolist()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ([], "Joint motor leaves its limit of 2 rad at t = 1; it is 4.5 rad at t = 2."),
+        (
+            ["--deg"],
+            "Joint motor leaves its limit of 114.6 deg at t = 1; it is 257.8 deg at t = 2.",
+        ),
+    ],
+    ids=["rad", "deg"],
+)
+@pytest.mark.filterwarnings("always")
+def test_that_a_warning_has_the_unit_of_angles_that_is_asked_for(
+    kincompile, pendulum, options, said
+):
+    limit = 'mechanism.limit("motor", greatest=2)\n'
+    pendulum.write_text(pendulum.read_text("utf-8") + limit, encoding="utf-8")
+    done = kincompile("run", pendulum, *options)
+    assert f"Warning: pendulum: {said}\n" in done.stderr

@@ -497,8 +497,10 @@ def test_that_limits_that_a_motion_leaves_are_named_with_time_and_value(tmp_path
         with pytest.warns(KincompileWarning, match=r"Joint crank leaves its limit of 1\.1") as seen:
             said = kc.solve(module, t).message
         assert str(seen[0].message).removeprefix("n_4_bar: ") in said
-        assert "Joint crank leaves its limit of 1.1 rad at t = 0.81; it is 1.3 at t = 1." in said
+        assert (
+            "Joint crank leaves its limit of 1.1 rad at t = 0.81; it is 1.3 rad at t = 1." in said
+        )
         assert (
             f"Joint rocker leaves its limit of {middle:.6g} rad at t = {t[first]:.10g}; it is "
-            f"{rocker[worst]:.6g} at t = {t[worst]:.10g}."
+            f"{rocker[worst]:.6g} rad at t = {t[worst]:.10g}."
         ) in said

@@ -56,13 +56,14 @@ def read_back(m):
 
 
 LEFT = {
-    "hinge": ("B", -1.5, 9, "Joint B leaves its limit of -1.5 rad at t = 0.8; it is -2 at t = 1."),
+    "hinge": ("B", -1.5, 9,
+              "Joint B leaves its limit of -1.5 rad at t = 0.8; it is -2 rad at t = 1."),
     "slider": ("guide", 0, 0.55,
-               "Joint guide leaves its limit of 0.55 cm at t = 0.6; it is 1 at t = 1."),
+               "Joint guide leaves its limit of 0.55 cm at t = 0.6; it is 1 cm at t = 1."),
     "angle": ("shoulder", 0, 0.75,
-              "Joint shoulder leaves its limit of 0.75 rad at t = 0.8; it is 1 at t = 1."),
+              "Joint shoulder leaves its limit of 0.75 rad at t = 0.8; it is 1 rad at t = 1."),
     "cylinder": ("stroke", 1.05, 9,
-                 "Joint stroke leaves its limit of 1.05 cm at t = 0; it is 1 at t = 0."),
+                 "Joint stroke leaves its limit of 1.05 cm at t = 0; it is 1 cm at t = 0."),
 }  # fmt: skip
 
 
@@ -79,8 +80,9 @@ def test_that_angles_of_hinges_in_space_are_counted_over_a_turn():
     m.limit("hinge", -1, 3.7, cross_i=(1, 0, 0), cross_j=(0, 1, 0))
     m.limit("guide", greatest=1.55)
     expected = (
-        f"Joint hinge leaves its limit of 3.7 rad at t = 0.6; it is {4 + np.pi / 2:.6g} at t = 1. "
-        "Joint guide leaves its limit of 1.55 m at t = 0.6; it is 2 at t = 1."
+        "Joint hinge leaves its limit of 3.7 rad at t = 0.6; "
+        f"it is {4 + np.pi / 2:.6g} rad at t = 1. "
+        "Joint guide leaves its limit of 1.55 m at t = 0.6; it is 2 m at t = 1."
     )
     assert said(m) == said(read_back(m)) == expected
 
@@ -90,7 +92,8 @@ def test_that_an_angle_counts_from_the_turn_nearest_to_the_middle_of_its_limits(
     m.limit("hinge", 5, 7)
     last = 2 * np.pi - 4
     assert (
-        said(m) == f"Joint hinge leaves its limit of 5 rad at t = 0.4; it is {last:.6g} at t = 1."
+        said(m)
+        == f"Joint hinge leaves its limit of 5 rad at t = 0.4; it is {last:.6g} rad at t = 1."
     )
 
 
@@ -98,7 +101,7 @@ def test_that_the_value_of_a_driver_is_what_it_drives_however_long_the_steps_are
     m = hinges()
     m.limit("motor", greatest=30)
     assert said(m, np.array([0, 2 * np.pi, 4 * np.pi])).endswith(
-        "it is 50.2655 at t = 12.56637061."
+        "it is 50.2655 rad at t = 12.56637061."
     )
 
 
@@ -149,7 +152,7 @@ def test_that_bodies_of_a_hinge_may_have_guesses_that_are_turns_apart():
     m.limit("x", greatest=0.4)
     assert said(m) == (
         f"Joint x leaves its limit of 0.4 at t = 0; it is {np.cos(1):.6g} at t = 0. "
-        "Joint A leaves its limit of 1.45 rad at t = 0.5; it is 2 at t = 1."
+        "Joint A leaves its limit of 1.45 rad at t = 0.5; it is 2 rad at t = 1."
     )
 
 
@@ -159,7 +162,9 @@ def test_that_the_unit_of_length_changes_nothing():
     m.add(kc.Translational("guide", m.ground, (0, 0), (1, 0), s, (0, 0), (1, 0)))
     m.add(kc.AbsoluteX("x", s, (0, 0), 1e-9 * (1 + kc.t)))
     m.limit("guide", 1e-9 * (1 + 1e-15), 1.45e-9)
-    assert said(m) == "Joint guide leaves its limit of 1.45e-09 m at t = 0.5; it is 2e-09 at t = 1."
+    assert (
+        said(m) == "Joint guide leaves its limit of 1.45e-09 m at t = 0.5; it is 2e-09 m at t = 1."
+    )
 
 
 def test_a_limit_that_is_no_number_with_some_parameters():
@@ -181,7 +186,7 @@ def test_that_a_simulation_says_which_limits_it_leaves():
     m.limit("guide", greatest=1.0)
     with pytest.warns(KincompileWarning, match="leaves its limit of"):
         message = kc.simulate(kc.compile(m), T).message
-    assert message.endswith(" Joint guide leaves its limit of 1 m at t = 0.5; it is 5 at t = 1.")
+    assert message.endswith(" Joint guide leaves its limit of 1 m at t = 0.5; it is 5 m at t = 1.")
 
 
 def test_that_inspect_lists_limits_as_they_are_written():
