@@ -166,14 +166,25 @@ export function erase(file, name) {
     }
   }
   const held = new Set(sketch.parts.flatMap(part => jointsIn([part.joints, part.joint].filter(Boolean).join(' '))));
-  for (const joint of Object.keys(sketch.joints)) if (!held.has(joint)) delete sketch.joints[joint];
+  const loose = Object.keys({ ...sketch.joints, ...sketch.ground }).filter(joint => !held.has(joint));
+  loose.forEach(joint => delete sketch.joints[joint]);
+  dropLimits(file, [...gone, ...loose]);
+}
+
+/* Take out the limits of constraints that the parts of these names bring. */
+function dropLimits(file, names) {
+  const own = names.flatMap(name => [name, `${name}_guide`, `${name}_slot`, `drive_${name.replace(/\W+/g, '_')}`]);
+  if (file.limits) file.limits = file.limits.filter(item => !own.includes(item.joint));
 }
 
 /** Take out a part by its place in the list. @param {any} file @param {number} k */
 export function erasePart(file, k) {
   const { parts } = sketchOf(file), part = parts[k];
   if (['link', 'wheel', 'slider', 'gear'].includes(kindOf(part))) erase(file, nameOf(part));
-  else parts.splice(k, 1);
+  else {
+    parts.splice(k, 1);
+    dropLimits(file, [part.drive ?? `${part.slot}_slot`]);
+  }
 }
 
 /** Bring a joint to a place.  Lengths that are given, and drivers that begin with a number, follow.

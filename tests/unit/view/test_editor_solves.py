@@ -416,3 +416,35 @@ def test_that_the_editor_is_one_file_of_at_most_700_kilobytes(tmp_path):
     assert "<script>alert" not in kc.editor(path).html
     assert "src=" not in page
     assert "://" not in page
+
+
+WITH_LIMITS = """
+kincompile = 1
+name = "m"
+limits = [
+    { joint = "A", greatest = 3 }, { joint = "D", greatest = 2 },
+    { joint = "drive_crank", greatest = 9 }, { joint = "drive_rocker", greatest = 9 },
+]
+
+[sketch]
+ground = { A = [0, 0], D = [4, 0] }
+joints = { B = [1, 0.5], C = [3, 2] }
+parts = [
+    { link = "crank", joints = "A B" }, { link = "rod", joints = "B C" },
+    { link = "rocker", joints = "D C" },
+    { drive = "crank", value = "t" }, { drive = "rocker", value = "t" },
+]
+"""
+
+
+def test_that_what_is_erased_takes_its_limits_with_it(tmp_path):
+    (found,) = run(
+        """const editing = new Editing();
+editing.openText(given);
+editing.edit(file => hand.erase(file, 'rocker'));
+tell([writeToml(editing.file)]);""",
+        WITH_LIMITS,
+    )
+    path = tmp_path / "m.toml"
+    path.write_text(found, encoding="utf-8")
+    assert [item.joint for item in kc.read_model(path).system().limits] == ["A", "drive_crank"]
