@@ -83,9 +83,9 @@ def _end(message: str, code: int) -> NoReturn:
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Write a warning to stderr as a message, without the line of code that gave it."""
-    context = click.get_current_context(silent=True)
-    unit = context.params.get("angle_unit", "rad") if context else "rad"
-    said = shown_angles(f"Warning: {message}", unit)
+    context, said = click.get_current_context(silent=True), f"Warning: {message}"
+    if context and context.params.get("angle_unit", "rad") != "rad":
+        said = shown_angles(said, context.params["angle_unit"])
     click.echo(on_screen(escaped_lines(said)), err=True)
 
 

@@ -40,7 +40,7 @@ def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], lis
     within_a_turn = system.ground.kind.turning[1]
     lengths = [item.unit == system.length_unit for item in system.coordinates]
     names = [item.name for item in system.parameters]
-    units = [value_of(item).unit for item in measuring]
+    units = ["rad" if value_of(x).unit == "rad" else system.length_unit for x in measuring]
 
     def left(q: Array, t: Array, p: Array) -> list[str]:
         found = np.isfinite(q).all(axis=1)
@@ -65,13 +65,10 @@ def limits_left(system: ConstraintSystem) -> Callable[[Array, Array, Array], lis
                 beyond = sign * (counted - most) / whole
                 if beyond.max() > ZERO:  # less may be rounding errors
                     first, last = int(np.argmax(beyond > ZERO)), int(np.argmax(beyond))
-                    own_unit = "rad" if unit == "rad" else system.length_unit
-                    limits_end, reached = (
-                        f"{value:.6g} {own_unit}".rstrip() for value in (most, counted[last])
-                    )
+                    end, reached = (f"{x:.6g} {unit}".rstrip() for x in (most, counted[last]))
                     sentences.append(
-                        f"Joint {limit.joint} leaves its limit of {limits_end} at "
-                        f"t = {t[first]:.10g}; it is {reached} at t = {t[last]:.10g}"
+                        f"Joint {limit.joint} leaves its limit of {end} at t = {t[first]:.10g}; "
+                        f"it is {reached} at t = {t[last]:.10g}"
                     )
         return sentences
 
